@@ -1,0 +1,169 @@
+# shellcheck shell=bash
+# Sourced by the scripts here. Chooses what builds the package; installs from
+# Debian what is missing, where it may.
+#
+#   the first of these that is there        BEHAVIOR_TOOLCHAIN  dependencies
+#   ------------------------------------    ------------------  -------------------
+#   cabal, GHC and an index of Hackage      cabal               from Hackage
+#   cabal, GHC and the libraries below      cabal-offline       those installed
+#   stack, GHC and the libraries below      stack-offline       those installed
+#   stack, and it reaches its snapshot      stack               from the snapshot
+#   Debian's apt-get, as root               (install, then the first line again)
+#   none of them                            (one line that says what to install)
+#
+# "GHC" is GHC 9.0 or later. Set BEHAVIOR_TOOLCHAIN to choose otherwise. Nobody's
+# configuration of cabal or stack is touched.
+
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# What cabal, GHC and the programs read and write is UTF-8, whatever the locale.
+[ "$(locale charmap 2>/dev/null)" = UTF-8 ] || export LC_ALL=C.UTF-8
+
+# The libraries that do not come with GHC, each with its Debian package.
+libraries=(
+  async:libghc-async-dev
+  hspec:libghc-hspec-dev
+  optparse-applicative:libghc-optparse-applicative-dev
+  QuickCheck:libghc-quickcheck2-dev
+)
+debian_packages=(ghc cabal-install "${libraries[@]#*:}")
+
+die() {
+  echo "$*" >&2
+  exit 1
+}
+
+# --- what is there ----------------------------------------------------------
+
+has() {
+  command -v "$1" >/dev/null
+}
+
+has_ghc() {
+  has ghc && has ghc-pkg && [ "$(ghc --numeric-version | cut -d. -f1)" -ge 9 ]
+}
+
+has_libraries() {
+  local installed library
+  installed=" $(ghc-pkg list --global --simple-output 2>/dev/null)"
+  for library in "${libraries[@]%%:*}"; do
+    [[ $installed == *" $library-"[0-9]* ]] || return 1
+  done
+}
+
+# cabal keeps an index for each repository, in a folder that its configuration
+# may name.
+has_index() {
+  local root=${CABAL_DIR:-${HOME:-}/.cabal} named cache
+  named=$(sed -n 's/^ *remote-repo-cache: *//p' "${CABAL_CONFIG:-$root/config}" 2>/dev/null || true)
+  for cache in "$named" "$root/packages" "${XDG_CACHE_HOME:-${HOME:-}/.cache}/cabal/packages"; do
+    if compgen -G "$cache/*/01-index.*" >/dev/null; then return; fi
+  done
+  return 1
+}
+
+has_snapshot() {
+  run_stack build --test --dry-run </dev/null >/dev/null 2>&1
+}
+
+choose() {
+  if has cabal && has_ghc && has_index; then BEHAVIOR_TOOLCHAIN=cabal
+  elif has cabal && has_ghc && has_libraries; then BEHAVIOR_TOOLCHAIN=cabal-offline
+  elif has stack && has_ghc && has_libraries; then BEHAVIOR_TOOLCHAIN=stack-offline
+  elif has stack && BEHAVIOR_TOOLCHAIN=stack has_snapshot; then BEHAVIOR_TOOLCHAIN=stack
+  else return 1
+  fi
+}
+
+# Chooses once: the scripts that this one starts inherit the choice.
+find_toolchain() {
+  [ -z "${BEHAVIOR_TOOLCHAIN:-}" ] || return 0
+  choose || { install "${debian_packages[@]}" && choose; } || die \
+    "Nothing to build with: install GHC (9.0 or later) and cabal and run 'cabal update'; or stack; or, on Debian 12 or later, as root: apt-get install ${debian_packages[*]}"
+  export BEHAVIOR_TOOLCHAIN
+}
+
+# --- installing -------------------------------------------------------------
+
+apt_get() {
+  DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends \
+    -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 "$@" </dev/null
+}
+
+# install PACKAGE...: those of the Debian packages that are missing. Fails where
+# that cannot be: not Debian, not root, no network.
+install() {
+  local package missing=() log
+  has apt-get && [ "$(id -u)" = 0 ] || return 1
+  for package; do
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
+      missing+=("$package")
+  done
+  if [ ${#missing[@]} -gt 0 ]; then
+    echo "Installing from Debian: ${missing[*]}" >&2
+    log=$(mktemp)
+    # The lists of packages are fetched only when those at hand do not serve.
+    if ! { apt_get install "${missing[@]}" || { apt_get update && apt_get install "${missing[@]}"; }; } >"$log" 2>&1; then
+      tail -n 5 "$log" >&2
+      rm -f "$log"
+      return 1
+    fi
+    rm -f "$log"
+  fi
+  # Another GHC may come first in PATH; the libraries belong to this one.
+  export PATH="/usr/bin:$PATH"
+}
+
+# need PROGRAM...: the Debian packages have the programs' names.
+need() {
+  local program
+  for program; do
+    has "$program" || install "$program" || die "$program is missing: install it (on Debian, as root: apt-get install $program)"
+  done
+}
+
+# --- building ---------------------------------------------------------------
+
+# Without an index cabal gives up before it has looked at the packages that are
+# installed; an empty repository is index enough. cabal wants its path absolute,
+# and without spaces.
+run_cabal() {
+  local dir=dist-newstyle/offline url
+  if [ "$BEHAVIOR_TOOLCHAIN" = cabal ]; then
+    cabal "$@"
+    return
+  fi
+  case $PWD in
+    *[!A-Za-z0-9/._-]*) url=file+noindex:$dir/packages ;;
+    *) url=file+noindex://$PWD/$dir/packages ;;
+  esac
+  mkdir -p $dir/packages
+  printf '%s\n' 'repository empty' "  url: $url" 'active-repositories: :none' >$dir/config
+  env -u CABAL_CONFIG CABAL_DIR="$PWD/$dir" cabal "$@"
+}
+
+run_stack() {
+  local options=(--allow-different-user)
+  if [ "$BEHAVIOR_TOOLCHAIN" = stack-offline ]; then
+    options+=(--system-ghc --resolver "ghc-$(ghc --numeric-version)")
+  fi
+  stack "${options[@]}" "$@"
+}
+
+# build KIND:NAME...: what the tools say goes to stderr.
+build() {
+  find_toolchain
+  case $BEHAVIOR_TOOLCHAIN in
+    cabal*) run_cabal build --enable-tests "$@" ;;
+    stack*) run_stack build --test --no-run-tests "${@/#/behavior-lang:}" ;;
+  esac >&2
+}
+
+# binary KIND:NAME: the path of what was built.
+binary() {
+  case $BEHAVIOR_TOOLCHAIN in
+    cabal*) run_cabal list-bin --enable-tests "$1" ;;
+    stack*) echo "$(run_stack path --dist-dir)/build/${1#*:}/${1#*:}" ;;
+  esac
+}

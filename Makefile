@@ -1,0 +1,32 @@
+.PHONY: help demo test warnings doctest lint docs check matrix ci clean
+
+help:
+	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
+	@echo 'make test      the test suite, under three runtimes (ARGS="-m NAME" selects tests)'
+	@echo 'make warnings  build everything with warnings as errors'
+	@echo 'make doctest   run the examples in the documentation'
+	@echo 'make lint      hlint'
+	@echo 'make docs      the documentation, which must cover every export'
+	@echo 'make check     what cabal has to say about the package'
+	@echo 'make matrix    demo and test in clean Debian systems (SUITES="bookworm" selects)'
+	@echo 'make ci        all of these'
+	@echo 'make clean     remove what was built'
+
+demo:
+	@.ci/exec door-battery --front locked --back locked --battery 15 --drain 2 \
+	  --charge 40 --threshold 10 --action 1 --speed 10
+
+test:
+	@.ci/test $(ARGS)
+
+warnings doctest lint docs check:
+	@.ci/$@
+
+matrix:
+	@.ci/matrix $(SUITES)
+
+ci:
+	@.ci/run
+
+clean:
+	rm -rf dist-newstyle .stack-work

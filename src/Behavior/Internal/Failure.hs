@@ -1,0 +1,276 @@
+{-# LANGUAGE ExistentialQuantification #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Failure, and what to do about it.
+--
+-- A /failure/ is the robot's: it could not do it. A /fault/ is the program's or
+-- the machine's: a bug, a lost connection. A /cancellation/ is somebody's who no
+-- longer wants the behaviour. The three are kept apart by their types:
+--
+-- +--------------+------------------------------------------+------------------------+
+-- |              | is                                       | caught by '?'          |
+-- +==============+==========================================+========================+
+-- | failure      | an exception under 'BehaviorFailed'      | yes                    |
+-- +--------------+------------------------------------------+------------------------+
+-- | cancellation | an exception under 'SomeAsyncException'  | never                  |
+-- +--------------+------------------------------------------+------------------------+
+-- | fault        | every other exception                    | never                  |
+-- +--------------+------------------------------------------+------------------------+
+module Behavior.Internal.Failure
+  ( Behavior
+
+    -- * The hierarchy
+  , BehaviorFailed (..)
+  , behaviorFailedToException
+  , behaviorFailedFromException
+  , Failed (..)
+
+    -- * Failing
+  , failed
+  , failWith
+  , failingOn
+  , isFailure
+  , isCancellation
+  , trySynchronous
+
+    -- * What to do when something fails
+  , fallback
+  , (?)
+  , fallbackOver
+  , attempt
+  ) where
+
+import Control.Exception
+  ( Exception (..)
+  , SomeAsyncException
+  , SomeException (..)
+  , throwIO
+  , try
+  )
+import Control.Monad.Catch (MonadThrow (throwM))
+import Data.Foldable (toList)
+import Data.Maybe (isJust)
+import Data.Typeable (cast)
+
+-- | An action of the agent: it takes time, returns an @a@, or throws.
+--
+-- Behaviours are composed in sequence with 'Prelude.>>=', 'Prelude.>>' and @do@,
+-- which remember how far they have come; and with the operators of this package.
+--
+-- /Sections 4 and 5 of the paper./
+--
+-- @since 0.1.0.0
+type Behavior = IO
+
+-- | The root of all failures, as 'SomeException' is of all exceptions.
+--
+-- To make a failure type of your own, put it under this root; it can then be
+-- caught by '?' together with every other failure, or by its own type:
+--
+-- >>> import Control.Exception
+-- >>> data DoorLocked = DoorLocked deriving Show
+-- >>> :{
+-- instance Exception DoorLocked where
+--   toException = behaviorFailedToException
+--   fromException = behaviorFailedFromException
+-- :}
+--
+-- >>> throwIO DoorLocked ? putStrLn "take the window"
+-- take the window
+--
+-- >>> throwIO DoorLocked `catch` \DoorLocked -> putStrLn "fetch the key"
+-- fetch the key
+--
+-- /Section 5 of the paper./
+--
+-- @since 0.1.0.0
+data BehaviorFailed = forall e. Exception e => BehaviorFailed e
+
+instance Show BehaviorFailed where
+  showsPrec precedence (BehaviorFailed e) = showsPrec precedence e
+
+instance Exception BehaviorFailed where
+  displayException (BehaviorFailed e) = displayException e
+
+-- | The 'toException' of a type that is to be a failure.
+--
+-- @since 0.1.0.0
+behaviorFailedToException :: Exception e => e -> SomeException
+behaviorFailedToException = toException . BehaviorFailed
+
+-- | The 'fromException' of a type that is to be a failure.
+--
+-- @since 0.1.0.0
+behaviorFailedFromException :: Exception e => SomeException -> Maybe e
+behaviorFailedFromException e = do
+  BehaviorFailed inner <- fromException e
+  cast inner
+
+-- | The failure to throw when no better one is at hand.
+--
+-- /Section 6 of the paper, where it is the failure of @attempt@./
+--
+-- @since 0.1.0.0
+data Failed
+  = -- | It could not be done.
+    Failed
+  | -- | It could not be done, and this is why.
+    FailedBecause String
+  deriving (Eq, Show)
+
+instance Exception Failed where
+  toException = behaviorFailedToException
+  fromException = behaviorFailedFromException
+  displayException = \case
+    Failed -> "the behaviour failed"
+    FailedBecause why -> "the behaviour failed: " ++ why
+
+-- | Fails with 'Failed'. It works in every 'MonadThrow', so in a transaction too.
+--
+-- > failed ? b  =  b
+--
+-- >>> failed ? pure "recovered"
+-- "recovered"
+--
+-- @since 0.1.0.0
+failed :: MonadThrow m => m a
+failed = throwM Failed
+
+-- | Fails with 'FailedBecause' the given reason.
+--
+-- >>> failWith "the door is locked" :: Behavior ()
+-- *** Exception: FailedBecause "the door is locked"
+--
+-- @since 0.1.0.0
+failWith :: MonadThrow m => String -> m a
+failWith = throwM . FailedBecause
+
+-- | Turns chosen faults into failures, at the edge where an action meets the
+-- hardware: @failingOn chosen act@ is @act@, but where @act@ throws an @e@ that is
+-- @chosen@, it fails with that @e@ inside a 'BehaviorFailed'.
+--
+-- A failure stays the failure it is, and an asynchronous exception is never
+-- turned into anything, whatever type is asked for.
+--
+-- >>> import System.IO.Error
+-- >>> let readSensor = readFile "/no/such/device"
+-- >>> failingOn isDoesNotExistError readSensor ? pure "no sensor"
+-- "no sensor"
+--
+-- @since 0.1.0.0
+failingOn :: Exception e => (e -> Bool) -> Behavior a -> Behavior a
+failingOn chosen act =
+  try act >>= \case
+    Right a -> pure a
+    Left e
+      | isCancellation e || isFailure e -> throwIO e
+      | Just fault <- fromException e, chosen fault -> throwIO (asFailure e)
+      | otherwise -> throwIO e
+ where
+  asFailure (SomeException e) = BehaviorFailed e
+
+-- | Whether an exception is a failure.
+isFailure :: SomeException -> Bool
+isFailure e = isJust (fromException e :: Maybe BehaviorFailed)
+
+-- | Whether an exception is a cancellation: asynchronous by its type, which is all
+-- that can be known of it.
+isCancellation :: SomeException -> Bool
+isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
+
+-- | 'try' that lets cancellations through.
+trySynchronous :: IO a -> IO (Either SomeException a)
+trySynchronous act =
+  try act >>= \case
+    Left e | isCancellation e -> throwIO e
+    result -> pure result
+
+-- | @fallback first second@ runs @first@; if that /fails/, it runs @second@.
+--
+-- > fallback (pure a) b                  =  pure a
+-- > fallback failed b                    =  b
+-- > fallback a (fallback b c)            =  fallback (fallback a b) c
+--
+-- Faults and cancellations of @first@ pass through: @second@ does not run.
+-- @second@ runs after @first@ and all its handlers have ended, in the caller's
+-- own masking state (never inside an exception handler, where it could not be
+-- interrupted). What @second@ throws is thrown.
+--
+-- A chain that nests to the right, as '?' does, runs in constant space.
+--
+-- >>> fallback (failWith "locked") (putStrLn "smash it")
+-- smash it
+--
+-- /Section 5 of the paper, Fallback; Section 3.3 for why it is not reactive./
+--
+-- @since 0.1.0.0
+fallback :: Behavior a -> Behavior a -> Behavior a
+fallback first second =
+  -- 'try', not 'catch': a handler would run the second behaviour masked.
+  try first >>= \case
+    Right a -> pure a
+    Left BehaviorFailed {} -> second
+
+-- | 'fallback' as an operator. It binds tighter than @|||@ and 'Prelude.>>', and
+-- nests to the right.
+--
+-- >>> failed ? failed ? pure "the third"
+-- "the third"
+--
+-- Under @ImplicitParams@ write spaces around it. To 'fallback' belongs all the
+-- rest that there is to say.
+--
+-- @since 0.1.0.0
+(?) :: Behavior a -> Behavior a -> Behavior a
+(?) = fallback
+
+infixr 3 ?
+
+-- | Tries a behaviour on each input in turn, until one does not fail.
+--
+-- > fallbackOver [x, y, z] act  =  act x ? act y ? act z
+-- > fallbackOver []        act  =  failed
+--
+-- If all fail, the last failure is thrown. Faults and cancellations pass through
+-- at once.
+--
+-- >>> let open door = if door == "back" then pure door else failWith (door ++ " is locked")
+-- >>> fallbackOver ["front", "back", "cellar"] open
+-- "back"
+--
+-- /Section 6 of the paper, @fallback@ over a list./
+--
+-- @since 0.1.0.0
+fallbackOver :: Foldable t => t x -> (x -> Behavior a) -> Behavior a
+fallbackOver inputs act = case toList inputs of
+  [] -> failed
+  first : others -> go first others
+ where
+  go x [] = act x
+  go x (y : ys) = act x ? go y ys
+
+-- | Tries a behaviour up to @n@ times.
+--
+-- > attempt 1 act        =  act
+-- > attempt (n + 1) act  =  act ? attempt n act
+--
+-- The last failure is thrown as it is. With @n <= 0@ it fails at once with
+-- 'Failed', and nothing runs. Faults and cancellations pass through at once.
+--
+-- >>> attempt 3 (putStrLn "push" >> failed)
+-- push
+-- push
+-- push
+-- *** Exception: Failed
+--
+-- To try a behaviour that takes an argument, compose: @attempt 3 . open@.
+--
+-- /Section 6 of the paper./
+--
+-- @since 0.1.0.0
+attempt :: Int -> Behavior a -> Behavior a
+attempt n act
+  | n <= 0 = failed
+  | n == 1 = act
+  | otherwise = act ? attempt (n - 1) act

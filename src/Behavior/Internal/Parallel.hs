@@ -1,0 +1,219 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Several behaviours at once.
+module Behavior.Internal.Parallel
+  ( -- * Two
+    parallel
+  , (|||)
+  , both
+
+    -- * Any number
+  , firstOf
+  , allOf
+
+    -- * One more, while the rest goes on
+  , Nursery
+  , scoped
+  , fork
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception (ErrorCall (..), finally, onException, throwIO)
+import Control.Monad (filterM, void)
+import Data.Foldable (asum, toList)
+import Data.Traversable (for, mapAccumL)
+
+import Behavior.Internal.Failure (Behavior, failed)
+import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Scope
+
+-- | Starts two behaviours at once; the first to finish ends the other.
+--
+-- > parallel left right  =  firstOf [void left, void right]
+--
+-- [Result] None. When both have finished as the operator looks (a /tie/), what
+--   counts is how the left one ended.
+-- [Failure] If the first to finish failed, its failure is thrown. That of a
+--   behaviour which had already lost is ignored.
+-- [Fault] The leftmost fault of the two, in a cleanup too, is always thrown.
+-- [Cancellation] Both are asked to stop at once. However it ends, it returns after
+--   both have ended, cleanup included: a slow cleanup makes the caller wait.
+--
+-- >>> parallel (pure ()) (sleep 3600)
+--
+-- >>> parallel (failWith "lost sight of the wall") (sleep 3600)
+-- *** Exception: FailedBecause "lost sight of the wall"
+--
+-- /Section 5 of the paper, Parallelism./
+--
+-- @since 0.1.0.0
+parallel :: Behavior a -> Behavior b -> Behavior ()
+parallel left right =
+  race [(Label "parallel" "left", void left), (Label "parallel" "right", void right)]
+
+-- | 'parallel' as an operator. It binds looser than '?' and tighter than
+-- 'Prelude.>>'. (@Control.Arrow@ has another function of this name.)
+--
+-- >>> sleep 3600 ||| putStrLn "beep"
+-- beep
+--
+-- @since 0.1.0.0
+(|||) :: Behavior a -> Behavior b -> Behavior ()
+(|||) = parallel
+
+infixr 2 |||
+
+-- | Starts two behaviours at once and waits for both.
+--
+-- > both left right  =  void (allOf [void left, void right])
+--
+-- [Result] None.
+-- [Failure] The first failure stops the other behaviour, and is thrown; on a tie
+--   the left one.
+-- [Fault] The leftmost fault of the two, in a cleanup too, is always thrown.
+-- [Cancellation] Both are asked to stop at once; it returns after both have ended.
+--
+-- >>> both (sleep 0.01 >> putStrLn "arm is up") (putStrLn "light is on")
+-- light is on
+-- arm is up
+--
+-- /Section 5 of the paper, Parallelism./
+--
+-- @since 0.1.0.0
+both :: Behavior a -> Behavior b -> Behavior ()
+both left right =
+  void (gather [(Label "both" "left", void left), (Label "both" "right", void right)])
+
+-- | Starts all at once and gives the result of the first to finish.
+--
+-- > firstOf []  =  failed
+--
+-- [Result] That of the first to finish; on a tie, of the leftmost. The others are
+--   asked to stop all at once, and have ended when it returns.
+-- [Failure] If the first to finish failed, its failure is thrown. To be satisfied
+--   with the first that /succeeds/, give the behaviours a @?@ of their own.
+-- [Fault] The leftmost fault of all, in a cleanup too, is always thrown.
+-- [Cancellation] All are asked to stop at once; it returns after all have ended.
+--
+-- >>> firstOf [sleep 3600 >> pure "camera", pure "lidar"]
+-- "lidar"
+--
+-- @since 0.1.0.0
+firstOf :: [Behavior a] -> Behavior a
+firstOf [] = failed
+firstOf behaviors = race (snd (numbered "firstOf" behaviors))
+
+-- | Starts all at once, waits for all, and gives their results, each in the place
+-- of its behaviour.
+--
+-- [Result] All results. On nothing it returns nothing.
+-- [Failure] The first failure stops the rest, and is thrown; on a tie the leftmost.
+-- [Fault] The leftmost fault of all, in a cleanup too, is always thrown.
+-- [Cancellation] All are asked to stop at once; it returns after all have ended.
+--
+-- >>> allOf [pure "left wheel", pure "right wheel"]
+-- ["left wheel","right wheel"]
+--
+-- @since 0.1.0.0
+allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
+allOf = gather . snd . numbered "allOf"
+
+-- | Gives every behaviour the label of its operator and place.
+numbered :: Traversable t => String -> t (Behavior a) -> (Int, t (Label, Behavior a))
+numbered operator = mapAccumL (\n act -> (n + 1, (Label operator (show n), act))) 1
+
+race :: [(Label, Behavior a)] -> Behavior a
+race behaviors = structured $ \scope -> do
+  branches <- traverse (uncurry (branch scope)) behaviors
+  settle <$> atomically (asum (outcome <$> branches))
+
+gather :: Traversable t => t (Label, Behavior a) -> Behavior (t a)
+gather behaviors = structured $ \scope -> do
+  -- One variable tells of trouble anywhere, so that waiting for n branches takes
+  -- n looks at two variables, and not n looks at n.
+  trouble <- newTVarIO False
+  branches <- for behaviors $ \(label, act) -> branch scope label (act `alarming` trouble)
+  let waiting [] = pure (traverse (atomically . completed) branches)
+      waiting (b : bs) = do
+        quiet <- atomically ((True <$ completed b) `orElse` (False <$ (readTVar trouble >>= check)))
+        if quiet then waiting bs else throwIO <$> atomically (asum (uncompleted <$> branches))
+  waiting (toList branches)
+
+-- | Raises the alarm if the behaviour throws.
+alarming :: Behavior a -> TVar Bool -> Behavior a
+alarming act trouble = act `onException` atomically (writeTVar trouble True)
+
+-- | A place where behaviours run beside a 'scoped' one.
+--
+-- @since 0.1.0.0
+newtype Nursery = Nursery (TVar (Maybe [Request]))
+-- ^ What is to be forked next, the newest first; nothing once 'scoped' has ended.
+
+-- | A behaviour to fork, and where to say that it was started.
+data Request = Request (Behavior ()) (TMVar ())
+
+-- | Runs a behaviour that may 'fork' others, which are stopped when it ends.
+--
+-- [Result] That of the behaviour. What was forked is then asked to stop, all at
+--   once, and has ended when 'scoped' returns.
+-- [Failure] If a forked behaviour fails, the scoped one and all the others are
+--   stopped, and that failure is thrown.
+-- [Fault] The leftmost fault (the scoped behaviour's before those of the forked,
+--   in the order in which they were forked), in a cleanup too, is always thrown.
+-- [Cancellation] All are asked to stop at once; it returns after all have ended.
+--
+-- >>> :{
+-- scoped $ \nursery -> do
+--   picture <- fork nursery (pure "a picture of the room")
+--   putStrLn "driving on meanwhile"
+--   atomically picture
+-- :}
+-- driving on meanwhile
+-- "a picture of the room"
+--
+-- @since 0.1.0.0
+scoped :: (Nursery -> Behavior a) -> Behavior a
+scoped body = structured $ \scope -> do
+  requests <- newTVarIO (Just [])
+  trouble <- newTVarIO False
+  main <- branch scope (Label "scoped" "body") (body (Nursery requests))
+  let serve children = do
+        next <- atomically (asum [Left . settle <$> outcome main, Left <$> alarm, Right <$> arrived])
+        case next of
+          Left verdict -> pure verdict
+          Right new -> do
+            forked <- for new $ \(Request act accepted) ->
+              branch scope (Label "scoped" "fork") (act `alarming` trouble)
+                <* atomically (putTMVar accepted ())
+            living <- filterM alive children
+            serve (living ++ forked)
+       where
+        alarm = readTVar trouble >>= check >> throwIO <$> asum (uncompleted <$> children)
+      arrived =
+        readTVar requests >>= \case
+          Just new@(_ : _) -> reverse new <$ writeTVar requests (Just [])
+          _ -> retry
+      alive child = do
+        over <- atomically ((True <$ completed child) `orElse` pure False)
+        if over then False <$ forget scope child else pure True
+  serve [] `finally` atomically (writeTVar requests Nothing)
+
+-- | Starts a behaviour that runs until it ends by itself, or 'scoped' ends. The
+-- transaction that it returns waits for the result.
+--
+-- Outside its 'scoped' the nursery is closed: an 'ErrorCall' (a fault) says so.
+--
+-- @since 0.1.0.0
+fork :: Nursery -> Behavior a -> Behavior (STM a)
+fork (Nursery requests) act = do
+  answer <- newEmptyTMVarIO
+  accepted <- newEmptyTMVarIO
+  let request = Request (act >>= atomically . putTMVar answer) accepted
+  atomically $ open >>= writeTVar requests . Just . (request :)
+  atomically $ takeTMVar accepted `orElse` (open >> retry)
+  pure (readTMVar answer)
+ where
+  open =
+    readTVar requests
+      >>= maybe (throwSTM (ErrorCall "fork: the nursery's scoped behaviour has ended")) pure

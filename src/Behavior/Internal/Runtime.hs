@@ -1,0 +1,231 @@
+{-# LANGUAGE GeneralizedNewtypeDeriving #-}
+
+-- |
+-- The seam: all that the library does with threads, time and waiting goes through
+-- this module. No other module forks, delays, throws to a thread or waits in a
+-- transaction, so whoever stands here sees, and may one day simulate, everything.
+--
+-- While nobody watches, what the seam adds is one read of a global reference.
+module Behavior.Internal.Runtime
+  ( -- * Threads
+    Label (..)
+  , Thread (..)
+  , start
+  , interrupt
+  , living
+
+    -- * Waiting
+  , atomically
+  , atomicallyFirmly
+  , checkpoint
+
+    -- * Time
+  , Seconds (..)
+  , now
+  , sleep
+  , sleepUntil
+  , duration
+  , period
+
+    -- * Watching
+  , Event (..)
+  , reportingTo
+  ) where
+
+import Control.Concurrent (ThreadId, forkIO, myThreadId, threadDelay, throwTo)
+import Control.Concurrent.Async (asyncThreadId, asyncWithUnmask, waitCatchSTM)
+import Control.Concurrent.STM (STM)
+import qualified Control.Concurrent.STM as STM
+import Control.Exception
+  ( BlockedIndefinitelyOnSTM (..)
+  , ErrorCall (..)
+  , Exception
+  , SomeException
+  , bracket_
+  , throwIO
+  , try
+  , uninterruptibleMask_
+  )
+import Control.Monad (join, when)
+import Data.Foldable (for_)
+import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
+import GHC.Clock (getMonotonicTime)
+import GHC.Conc (labelThread)
+import Numeric (showFFloat)
+import System.IO.Unsafe (unsafePerformIO)
+
+-- | Who started a thread, and what runs in it: @Label "monitor" "task"@.
+data Label = Label
+  { labelOperator :: String
+  , labelBranch :: String
+  }
+  deriving (Eq, Ord)
+
+instance Show Label where
+  show (Label operator branch) = operator ++ ": " ++ branch
+
+-- | A thread that the library has started, and how it ends.
+data Thread a = Thread
+  { threadId :: ThreadId
+  , threadEnd :: STM (Either SomeException a)
+  -- ^ Retries until the thread has ended, cleanup included.
+  }
+
+-- | Starts a thread in which the action runs unmasked, whatever the caller's
+-- masking state. Call it masked, or the thread may be lost before it is returned.
+start :: Label -> IO a -> IO (Thread a)
+start label act = do
+  modifyLiving 1
+  -- Forked masked: an exception cannot strike before 'try' is in place, nor
+  -- between the end of the action and the publication of how it ended.
+  thread <- asyncWithUnmask $ \unmask -> do
+    self <- myThreadId
+    labelThread self (show label)
+    report (Started label)
+    end <- try (unmask act)
+    report (Ended label)
+    modifyLiving (-1)
+    pure end
+  pure
+    Thread
+      { threadId = asyncThreadId thread
+      , threadEnd = join <$> waitCatchSTM thread
+      }
+
+-- | Throws an exception to each of several threads, all at once: none hears it
+-- later because another cannot be interrupted just now. Blocks, uninterruptibly,
+-- until the last of the list has heard it or has ended.
+interrupt :: Exception e => [(ThreadId, e)] -> IO ()
+interrupt [] = pure ()
+interrupt [(thread, e)] = uninterruptibleMask_ (throwTo thread e)
+interrupt ((thread, e) : others) = uninterruptibleMask_ $ do
+  -- 'throwTo' returns only when the exception is received, so all but one are
+  -- thrown from threads of their own.
+  messenger <- forkIO (throwTo thread e)
+  labelThread messenger (show (Label "interrupt" "messenger"))
+  interrupt others
+
+-- | How many threads started by 'start' have not ended.
+living :: IO Int
+living = readIORef livingCount
+
+livingCount :: IORef Int
+livingCount = unsafePerformIO (newIORef 0)
+{-# NOINLINE livingCount #-}
+
+modifyLiving :: Int -> IO ()
+modifyLiving change = atomicModifyIORef' livingCount (\n -> (n + change, ()))
+
+-- | Runs a transaction, waiting (without using the processor) while it retries.
+--
+-- It is 'Control.Concurrent.STM.atomically', by the door that this library uses
+-- itself: what a behaviour waits for by this door, the library can see. Like
+-- every wait it can be cancelled, also where exceptions are masked.
+--
+-- >>> import Control.Concurrent.STM (newTVarIO, readTVar)
+-- >>> battery <- newTVarIO 80
+-- >>> atomically (readTVar battery)
+-- 80
+--
+-- @since 0.1.0.0
+atomically :: STM a -> IO a
+atomically = STM.atomically
+
+-- | 'atomically' that nothing can interrupt; for the end of threads that were asked to
+-- stop. GHC's deadlock detector is not heeded: it takes a thread that waits for a
+-- cleanup which itself was just woken by the detector for deadlocked too.
+atomicallyFirmly :: STM a -> IO a
+atomicallyFirmly transaction = uninterruptibleMask_ waiting
+ where
+  waiting = try (atomically transaction) >>= either (\BlockedIndefinitelyOnSTM -> waiting) pure
+
+-- | A moment at which a cancellation that is under way arrives, if the masking
+-- state allows it. (GHC does that by itself; a simulation does it here.)
+checkpoint :: IO ()
+checkpoint = pure ()
+
+-- | A length of time, or a moment on the clock of 'now', in seconds. Write it as
+-- a literal: @sleep 0.5@; turn other numbers into it with 'realToFrac'.
+--
+-- @since 0.1.0.0
+newtype Seconds = Seconds Double
+  deriving (Eq, Ord, Num, Fractional, Real, RealFrac)
+
+instance Show Seconds where
+  -- 0.05, and not 5.0e-2
+  showsPrec precedence (Seconds s) = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
+
+instance Read Seconds where
+  readsPrec precedence input = [(Seconds s, rest) | (s, rest) <- readsPrec precedence input]
+
+-- | The time, in seconds since some fixed moment of this run of the program. It
+-- never goes backwards, and is not the time of day.
+--
+-- >>> before <- now
+-- >>> after <- now
+-- >>> after >= before
+-- True
+--
+-- @since 0.1.0.0
+now :: IO Seconds
+now = Seconds <$> getMonotonicTime
+
+-- | Waits for at least so many seconds, without using the processor.
+--
+-- Zero returns at once; an infinite number sleeps until it is cancelled. A
+-- negative number or NaN is refused with an 'ErrorCall' (a fault).
+--
+-- >>> sleep 0.001
+--
+-- >>> sleep (-1)
+-- *** Exception: sleep: a duration is zero or more seconds, not -1.0
+--
+-- @since 0.1.0.0
+sleep :: Seconds -> IO ()
+sleep seconds = do
+  _ <- duration "sleep" seconds
+  when (seconds > 0) $ now >>= \t -> sleepUntil (t + seconds)
+
+-- | Sleeps until the clock shows the given moment, or a later one.
+sleepUntil :: Seconds -> IO ()
+sleepUntil moment = do
+  t <- now
+  when (moment > t) $ do
+    -- A day at a time: the longest delay that 'threadDelay' can count is shorter
+    -- than the longest that can be asked for.
+    threadDelay (ceiling (min 86400 (moment - t) * 1000000))
+    sleepUntil moment
+
+-- | Refuses what is no duration: a negative number, or NaN.
+duration :: String -> Seconds -> IO Seconds
+duration operator seconds
+  | seconds >= 0 = pure seconds
+  | otherwise = refuse operator "a duration is zero or more seconds" seconds
+
+-- | Refuses what is no period: zero, a negative number, or NaN.
+period :: String -> Seconds -> IO Seconds
+period operator seconds
+  | seconds > 0 = pure seconds
+  | otherwise = refuse operator "a period is more than zero seconds" seconds
+
+refuse :: String -> String -> Seconds -> IO a
+refuse operator allowed seconds =
+  throwIO (ErrorCall (operator ++ ": " ++ allowed ++ ", not " ++ show seconds))
+
+-- | What can be reported of the life of a behaviour.
+data Event
+  = Started Label
+  | Ended Label
+  deriving (Eq, Ord, Show)
+
+-- | Reports every event to the given sink while the action runs. The sink is
+-- called by the thread that the event is about, masked; it must not block.
+reportingTo :: (Event -> IO ()) -> IO a -> IO a
+reportingTo sink = bracket_ (writeIORef eventSink (Just sink)) (writeIORef eventSink Nothing)
+
+report :: Event -> IO ()
+report event = readIORef eventSink >>= \sink -> for_ sink ($ event)
+
+eventSink :: IORef (Maybe (Event -> IO ()))
+eventSink = unsafePerformIO (newIORef Nothing)
+{-# NOINLINE eventSink #-}

@@ -1,0 +1,217 @@
+{-# LANGUAGE ExistentialQuantification #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Structured concurrency, once for all operators.
+--
+-- An operator starts branches in a 'Scope' and comes to a verdict. Then, however
+-- it came to that, 'structured' keeps the promises that are the same everywhere:
+--
+-- 1. What was started has ended, cleanup included, before the operator returns or
+--    throws; nothing orphans it, not even a second cancellation.
+-- 2. What has to stop is asked all at once, then waited for.
+-- 3. The outcome is the first that there is of: the caller's cancellation, the
+--    leftmost fault, the operator's verdict.
+module Behavior.Internal.Scope
+  ( -- * Scopes
+    Scope
+  , structured
+
+    -- * Branches
+  , Branch (outcome)
+  , SomeBranch (..)
+  , branch
+  , worker
+  , forget
+  , ask
+
+    -- * How a branch ends
+  , Outcome (..)
+  , completed
+  , uncompleted
+  , settle
+  , result
+  , StoppedWithFault (..)
+  ) where
+
+import Control.Concurrent (ThreadId)
+import Control.Concurrent.STM (STM, orElse, retry)
+import Control.Exception
+  ( Exception (..)
+  , SomeException
+  , asyncExceptionFromException
+  , asyncExceptionToException
+  , mask
+  , mask_
+  , throwIO
+  , try
+  )
+import Control.Monad (filterM)
+import Data.IORef (IORef, atomicModifyIORef', modifyIORef', newIORef, readIORef)
+
+import Behavior.Internal.Failure (isCancellation, isFailure)
+import Behavior.Internal.Runtime
+
+-- | The branches that an operator has started, newest first. Only the operator's
+-- own thread starts, stops and forgets them.
+newtype Scope = Scope (IORef [SomeBranch])
+
+-- | A behaviour that runs in a thread of its own on behalf of an operator.
+data Branch a = Branch
+  { branchThread :: ThreadId
+  , branchAsked :: IORef Bool
+  -- ^ Whether it was asked to stop: nobody is asked twice, for the second
+  -- request would interrupt the cleanup that the first one began.
+  , outcome :: STM (Outcome a)
+  -- ^ How the branch ended; retries until it has.
+  }
+
+data SomeBranch = forall a. SomeBranch (Branch a)
+
+-- | How a branch ended.
+data Outcome a
+  = -- | It returned, though perhaps it had been asked to stop.
+    Completed a
+  | -- | It failed.
+    Failing SomeException
+  | -- | It threw anything else, perhaps while it was being stopped.
+    Faulted SomeException
+  | -- | It was asked to stop and did.
+    Stopped SomeException
+
+-- | Lets the body start branches and come to a verdict (an action that returns or
+-- throws), stops what still runs, and gives the outcome.
+structured :: (Scope -> IO (IO a)) -> IO a
+structured body = mask $ \restore -> do
+  scope <- Scope <$> newIORef []
+  verdict <- try (restore (body scope))
+  faults <- end scope
+  -- A cancellation that came while the branches were stopping arrives here, and
+  -- not when the outcome has been thrown into some handler of the caller's.
+  cancelled <- case verdict of
+    Left e | isCancellation e -> pure (Left e)
+    _ -> try (restore checkpoint)
+  case (cancelled, faults) of
+    (Left cancellation, []) -> throwIO cancellation
+    (Left cancellation, fault : _) -> throwIO (StoppedWithFault cancellation fault)
+    (Right (), fault : _) -> throwIO fault
+    (Right (), []) -> either throwIO id verdict
+
+-- | Stops everything in the scope, and gives the faults from left to right.
+end :: Scope -> IO [SomeException]
+end (Scope branches) = do
+  started <- reverse <$> readIORef branches
+  ask started
+  concat <$> traverse (\(SomeBranch b) -> faults <$> atomicallyFirmly (outcome b)) started
+ where
+  faults = \case
+    Faulted e -> [e]
+    _ -> []
+
+-- | Starts a branch.
+branch :: Scope -> Label -> IO a -> IO (Branch a)
+branch scope label act = worker scope label (const act)
+
+-- | Starts a branch that can see whether it was asked to stop. One that runs a
+-- user's action in a loop must look: the action may have swallowed the request.
+worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
+worker (Scope branches) label act = mask_ $ do
+  asked <- newIORef False
+  thread <- start label (act (readIORef asked))
+  let new =
+        Branch
+          { branchThread = threadId thread
+          , branchAsked = asked
+          , outcome = either (ending (threadId thread)) Completed <$> threadEnd thread
+          }
+  modifyIORef' branches (SomeBranch new :)
+  pure new
+
+-- | Takes a branch that has ended, and did not fault, out of the scope, which
+-- otherwise would grow with every branch that an operator ever started.
+forget :: Scope -> Branch a -> IO ()
+forget (Scope branches) old =
+  modifyIORef' branches (filter (\(SomeBranch b) -> branchThread b /= branchThread old))
+
+-- | Asks branches to stop, all at once, and does not wait for their end. It
+-- returns when the last of the list has heard it.
+ask :: [SomeBranch] -> IO ()
+ask branches = mask_ $ do
+  running <- filterM needsAsking branches
+  interrupt [(branchThread b, Stop (branchThread b)) | SomeBranch b <- running]
+ where
+  needsAsking (SomeBranch b) = do
+    ended <- atomically ((True <$ outcome b) `orElse` pure False)
+    if ended then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
+
+-- | Waits until the branch has completed.
+completed :: Branch a -> STM a
+completed b = outcome b >>= either (const retry) pure . result
+
+-- | Waits until the branch has ended in any other way.
+uncompleted :: Branch a -> STM SomeException
+uncompleted b = outcome b >>= either pure (const retry) . result
+
+-- | The action that an outcome stands for.
+settle :: Outcome a -> IO a
+settle = either throwIO pure . result
+
+-- | What a branch returned, or what it threw.
+result :: Outcome a -> Either SomeException a
+result = \case
+  Completed a -> Right a
+  Failing e -> Left e
+  Faulted e -> Left e
+  Stopped e -> Left e
+
+-- | How a thread ended that ended with an exception.
+ending :: ThreadId -> SomeException -> Outcome a
+ending self e
+  | isOwnStop e = Stopped e
+  | Just (StoppedWithFault cause fault) <- fromException e, isOwnStop cause = Faulted fault
+  | isFailure e = Failing e
+  | otherwise = Faulted e
+ where
+  isOwnStop cause = fromException cause == Just (Stop self)
+
+-- | How an operator asks a branch to stop. It names the thread it is meant for: a
+-- request that strays into another thread is not mistaken for that one's own.
+newtype Stop = Stop ThreadId
+  deriving (Eq)
+
+instance Show Stop where
+  show (Stop _) = "Stop: the operator that started this behaviour no longer wants it"
+
+instance Exception Stop where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException
+
+-- | What is thrown when a behaviour was cancelled and a cleanup faulted on the way
+-- out: the cancellation and the fault, as one asynchronous exception, so that no
+-- handler for ordinary exceptions takes it for the end of the matter.
+--
+-- An operator that asked for the stop takes the fault out and throws it, as the
+-- fault that it is. You meet the pair itself where a cancellation came from
+-- outside this library, from 'System.Timeout.timeout' say.
+--
+-- @since 0.1.0.0
+data StoppedWithFault = StoppedWithFault
+  { stoppedBy :: SomeException
+  -- ^ The cancellation.
+  , stoppedFault :: SomeException
+  -- ^ The leftmost fault of the behaviours that it stopped.
+  }
+
+instance Show StoppedWithFault where
+  showsPrec precedence (StoppedWithFault cause fault) =
+    showParen (precedence > 10) $
+      showString "StoppedWithFault "
+        . showsPrec 11 cause
+        . showString " "
+        . showsPrec 11 fault
+
+instance Exception StoppedWithFault where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException
+  displayException (StoppedWithFault cause fault) =
+    "stopped by " ++ displayException cause ++ ", and while stopping: " ++ displayException fault

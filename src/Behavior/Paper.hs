@@ -1,0 +1,2 @@
+-- | Being written.
+module Behavior.Paper () where

@@ -1,0 +1,23 @@
+-- |
+-- Time, and waiting for it.
+--
+-- Durations are 'Seconds', written as literals.
+--
+-- >>> timeout 0.5 (sleep 0.001 >> pure "in time")
+-- "in time"
+module Behavior.Time
+  ( -- * The clock
+    Seconds
+  , now
+
+    -- * Waiting
+  , sleep
+  , atomically
+
+    -- * Limits
+  , timeout
+  , TimedOut (..)
+  ) where
+
+import Behavior.Internal.Runtime
+import Behavior.Internal.Time
