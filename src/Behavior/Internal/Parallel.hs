@@ -28,6 +28,10 @@ import Behavior.Internal.Failure (Behavior, failed)
 import Behavior.Internal.Runtime (Label (..), atomically)
 import Behavior.Internal.Scope
 
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Time (atomically)
+
 -- | Starts two behaviours at once; the first to finish ends the other.
 --
 -- > parallel left right  =  firstOf [void left, void right]

@@ -30,6 +30,11 @@ import Behavior.Internal.Runtime (Label (..), atomically)
 import Behavior.Internal.Scope
 import Behavior.Internal.Source
 
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Time (atomically)
+-- >>> import qualified Behavior.Signal as Signal
+
 -- | What to do for a value of the signal.
 data Reaction a
   = -- | Run this branch (with its name) until it ends or the value changes.
@@ -177,7 +182,7 @@ rSelect condition left right = react "rSelect" condition $ \case
 --   outranks an inner one. All is asked to stop at once; it returns after all has
 --   ended.
 --
--- >>> import Control.Concurrent.STM
+-- >>> import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 -- >>> battery <- newTVarIO (5 :: Int)
 -- >>> let recharge = putStrLn "recharge" >> atomically (writeTVar battery 100)
 -- >>> Signal.monitor ((< 10) <$> Signal.watching (readTVar battery)) recharge (putStrLn "work")

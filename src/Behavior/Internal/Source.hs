@@ -35,6 +35,10 @@ import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
 
+-- $setup
+-- >>> import Behavior
+-- >>> import qualified Behavior.Signal as Signal
+
 -- | A value that changes over time and can be watched.
 --
 -- (Functional reactive programming calls this a /behaviour/. Here a behaviour is
@@ -213,25 +217,32 @@ staleAfter :: Seconds -> Signal a -> Signal a
 staleAfter limit signal = Signal $ do
   _ <- period "staleAfter" limit
   source <- open signal
-  stale <- newTVarIO False
+  -- Odd while a reading is overdue, and higher whenever one has been: so a view
+  -- also fails for one that is over by the time it looks.
+  overdue <- newTVarIO (0 :: Int)
   let watchdog = forever $ do
         since <- atomically (reading source >>= maybe retry pure)
         sleepUntil (since + limit)
-        atomically $ do
-          current <- reading source
-          writeTVar stale (current == Just since)
-        atomically $ do
-          current <- reading source
-          when (current == Just since) retry
-          writeTVar stale False
+        isOverdue <- atomically $ do
+          still <- (== Just since) <$> reading source
+          when still (modifyTVar' overdue (+ 1))
+          pure still
+        when isOverdue . atomically $ do
+          still <- (== Just since) <$> reading source
+          when still retry
+          calm
+      calm = modifyTVar' overdue (\n -> if odd n then n + 1 else n)
       fresh look = do
-        isStale <- readTVar stale
-        when isStale (failWith ("no reading of the signal within " ++ show limit ++ " s"))
-        look
+        before <- readTVar overdue
+        pure $ do
+          n <- readTVar overdue
+          when (odd n || n > before) . failWith $
+            "no reading of the signal within " ++ show limit ++ " s"
+          look
   pure
     source
-      { workers = Worker "staleAfter" (writeTVar stale False) (const watchdog) : workers source
-      , view = fmap (fmap fresh) (view source)
+      { workers = Worker "staleAfter" calm (const watchdog) : workers source
+      , view = \moment -> view source moment >>= fresh
       }
 
 -- | A change counts only once it has lasted for so many seconds (zero or more);

@@ -32,6 +32,9 @@ import Behavior.Internal.Runtime (Label (..), Seconds, atomically, duration)
 import Behavior.Internal.Scope
 import Behavior.Internal.Source (elapsed)
 
+-- $setup
+-- >>> import Behavior (sleep, (?))
+
 -- | Runs the behaviour for at most so many seconds, and fails with 'TimedOut' when
 -- it takes longer.
 --
