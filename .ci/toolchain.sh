@@ -139,7 +139,8 @@ run_cabal() {
     *) url=file+noindex://$PWD/$dir/packages ;;
   esac
   mkdir -p $dir/packages
-  printf '%s\n' 'repository empty' "  url: $url" 'active-repositories: :none' >$dir/config
+  printf '%s\n' 'repository empty' "  url: $url" 'active-repositories: :none' \
+    'jobs: $ncpus' >$dir/config
   env -u CABAL_CONFIG CABAL_DIR="$PWD/$dir" cabal "$@"
 }
 

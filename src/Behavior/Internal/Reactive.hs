@@ -57,27 +57,27 @@ react operator signal reaction = structured $ \scope -> do
 
       -- Nothing runs: read, and do what the value says now.
       choose sensors moment = do
-        view' <- atomically (view source moment)
-        let look = for_ sensors unlessLost >> view'
-        trySynchronous (atomically look) >>= obeying sensors look
+        seen <- atomically (view source)
+        let value = (for_ sensors unlessLost >>) . look seen
+        trySynchronous (atomically (value moment)) >>= obeying sensors (value Later)
 
-      obeying sensors look = \case
+      obeying sensors value = \case
         Left lost -> pure (throwIO lost)
-        Right value -> case reaction value of
+        Right old -> case reaction old of
           Conclude verdict -> pure verdict
           RunToEnd name recovery -> do
-            ask (map SomeBranch sensors)
+            askWithoutWaiting (map SomeBranch sensors)
             recover sensors name recovery Nothing
-          Idle -> trySynchronous (atomically (changed look value)) >>= obeying sensors look
+          Idle -> trySynchronous (atomically (changed value old)) >>= obeying sensors value
           Run name act -> do
             running <- branch scope (Label operator name) act
             -- The branch is looked at first: one that has ended by itself is not
             -- interrupted, whatever the signal says in the same transaction.
             event <- trySynchronous . atomically $
-              (Left <$> outcome running) `orElse` (Right <$> changed look value)
+              (Left <$> outcome running) `orElse` (Right <$> changed value old)
             case event of
               Right (Left ended) -> pure (settle ended)
-              Right (Right value') -> interrupt sensors running (reaction value')
+              Right (Right new) -> interrupt sensors running (reaction new)
               Left lost -> interrupt sensors running (Conclude (throwIO lost))
 
       -- What is to come comes if the branch stops as it is asked to. If it
@@ -96,7 +96,7 @@ react operator signal reaction = structured $ \scope -> do
         _ ->
           stopping ([] `and'` running) >>= \case
             -- Read again: by now the value may be another, or the old one again.
-            Stopped _ -> forget scope running >> choose sensors Afresh
+            Stopped _ -> forget scope running >> choose sensors Later
             ended -> pure (settle ended)
        where
         others `and'` b = map SomeBranch others ++ [SomeBranch b]
@@ -113,13 +113,13 @@ react operator signal reaction = structured $ \scope -> do
           (Right (), Nothing) -> do
             forget scope recovered
             rested <- traverse (rest scope) sensors
-            if and rested then begin Afresh else pure (failWith "a sensor faulted")
+            if and rested then begin Later else pure (failWith "a sensor faulted")
   begin First
  where
-  changed look value = do
-    value' <- look
-    check (value' /= value)
-    pure value'
+  changed value old = do
+    new <- value
+    check (new /= old)
+    pure new
 
 -- | Waits until a branch that was asked to stop has ended. If it faulted it stays
 -- in the scope, which throws its fault.

@@ -12,6 +12,7 @@ module Behavior.Internal.Runtime
   , Thread (..)
   , start
   , interrupt
+  , interruptByMessenger
   , living
 
     -- * Waiting
@@ -92,18 +93,16 @@ start label act = do
       , threadEnd = join <$> waitCatchSTM thread
       }
 
--- | Throws an exception to each of several threads, all at once: none hears it
--- later because another cannot be interrupted just now. Blocks, uninterruptibly,
--- until the last of the list has heard it or has ended.
-interrupt :: Exception e => [(ThreadId, e)] -> IO ()
-interrupt [] = pure ()
-interrupt [(thread, e)] = uninterruptibleMask_ (throwTo thread e)
-interrupt ((thread, e) : others) = uninterruptibleMask_ $ do
-  -- 'throwTo' returns only when the exception is received, so all but one are
-  -- thrown from threads of their own.
-  messenger <- forkIO (throwTo thread e)
+-- | Throws an exception to a thread, and returns, uninterruptibly, when that has
+-- heard it or has ended. A thread in an uninterruptible cleanup is slow to hear.
+interrupt :: Exception e => ThreadId -> e -> IO ()
+interrupt thread e = uninterruptibleMask_ (throwTo thread e)
+
+-- | 'interrupt' by a messenger of its own, which does the waiting.
+interruptByMessenger :: Exception e => ThreadId -> e -> IO ()
+interruptByMessenger thread e = do
+  messenger <- forkIO (interrupt thread e)
   labelThread messenger (show (Label "interrupt" "messenger"))
-  interrupt others
 
 -- | How many threads started by 'start' have not ended.
 living :: IO Int

@@ -24,6 +24,7 @@ module Behavior.Internal.Scope
   , worker
   , forget
   , ask
+  , askWithoutWaiting
 
     -- * How a branch ends
   , Outcome (..)
@@ -47,6 +48,7 @@ import Control.Exception
   , try
   )
 import Control.Monad (filterM)
+import Data.Foldable (traverse_)
 import Data.IORef (IORef, atomicModifyIORef', modifyIORef', newIORef, readIORef)
 
 import Behavior.Internal.Failure (isCancellation, isFailure)
@@ -133,16 +135,30 @@ forget :: Scope -> Branch a -> IO ()
 forget (Scope branches) old =
   modifyIORef' branches (filter (\(SomeBranch b) -> branchThread b /= branchThread old))
 
--- | Asks branches to stop, all at once, and does not wait for their end. It
--- returns when the last of the list has heard it.
+-- | Asks branches to stop, all at once: none hears it later because another cannot
+-- be interrupted just now. Returns when the last of the list has heard it.
 ask :: [SomeBranch] -> IO ()
-ask branches = mask_ $ do
-  running <- filterM needsAsking branches
-  interrupt [(branchThread b, Stop (branchThread b)) | SomeBranch b <- running]
+ask branches = mask_ (filterM marked branches >>= go)
  where
-  needsAsking (SomeBranch b) = do
-    ended <- atomically ((True <$ outcome b) `orElse` pure False)
-    if ended then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
+  go [] = pure ()
+  go [SomeBranch b] = interrupt (branchThread b) (stopping b)
+  go (b : bs) = askByMessenger b >> go bs
+
+-- | Asks branches to stop, all at once, and does not wait for any to hear it.
+askWithoutWaiting :: [SomeBranch] -> IO ()
+askWithoutWaiting branches = mask_ (filterM marked branches >>= traverse_ askByMessenger)
+
+askByMessenger :: SomeBranch -> IO ()
+askByMessenger (SomeBranch b) = interruptByMessenger (branchThread b) (stopping b)
+
+stopping :: Branch a -> Stop
+stopping = Stop . branchThread
+
+-- | Marks a branch as asked. False if it was asked before, or has ended.
+marked :: SomeBranch -> IO Bool
+marked (SomeBranch b) = do
+  ended <- atomically ((True <$ outcome b) `orElse` pure False)
+  if ended then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
 
 -- | Waits until the branch has completed.
 completed :: Branch a -> STM a

@@ -7,6 +7,7 @@ module Behavior.Internal.Source
   ( -- * Signals
     Signal (..)
   , Source (..)
+  , View (..)
   , Moment (..)
   , startWorkers
   , unlessLost
@@ -66,22 +67,21 @@ instance Applicative Signal where
 data Source a = Source
   { workers :: [Worker]
   -- ^ What must run while the source is looked at.
-  , view :: Moment -> STM (STM a)
-  -- ^ From this moment on: a transaction for the value. It retries while there is
-  -- none yet, and throws when there is none any more.
+  , view :: STM (View a)
+  -- ^ A view of the values that are read from this moment on.
   , reading :: STM (Maybe Seconds)
   -- ^ When the oldest reading began that is under way.
   }
 
 instance Functor Source where
-  fmap f source = source {view = fmap (fmap (fmap f)) (view source)}
+  fmap f source = source {view = fmap f <$> view source}
 
 instance Applicative Source where
-  pure a = Source {workers = [], view = \_ -> pure (pure a), reading = pure Nothing}
+  pure a = Source {workers = [], view = pure (pure a), reading = pure Nothing}
   f <*> a =
     Source
       { workers = workers f ++ workers a
-      , view = \moment -> (<*>) <$> view f moment <*> view a moment
+      , view = (<*>) <$> view f <*> view a
       , reading = earliest <$> reading f <*> reading a
       }
    where
@@ -89,12 +89,26 @@ instance Applicative Source where
     earliest s Nothing = s
     earliest Nothing t = t
 
--- | What is asked of a view.
+-- | How to look at a value. The look retries while there is none yet, and throws
+-- when there is none any more.
+newtype View a = View {look :: Moment -> STM a}
+
+instance Functor View where
+  fmap f = looking (fmap f)
+
+instance Applicative View where
+  pure a = View (\_ -> pure a)
+  f <*> a = View (\moment -> look f moment <*> look a moment)
+
+looking :: (STM a -> STM b) -> View a -> View b
+looking f v = View (f . look v)
+
+-- | When an operator looks.
 data Moment
-  = -- | The first value that there is, however long it takes to come.
+  = -- | For the first time: it waits for a value, however long that takes to come.
     First
-  | -- | The value now: read after this moment, and lost if it is not there.
-    Afresh
+  | -- | Later: a value that is not there has been lost.
+    Later
 
 -- | A thread that a source needs while it is looked at.
 data Worker = Worker
@@ -118,10 +132,10 @@ data Worker = Worker
 --
 -- @since 0.1.0.0
 watching :: STM a -> Signal a
-watching transaction = Signal . pure $ (pure ()) {view = pure . look}
+watching transaction = Signal . pure $ (pure ()) {view = pure (View value)}
  where
-  look First = transaction
-  look Afresh = transaction `orElse` failWith "the signal has no value any more"
+  value First = transaction
+  value Later = transaction `orElse` failWith "the signal has no value any more"
 
 -- | A sensor that must be asked: @polling seconds act@ reads it by @act@, in a
 -- thread of its own, one reading at a time.
@@ -179,9 +193,9 @@ polling every act = Signal $ do
                   readAt (maybe t (max t) slot) asked
               }
           ]
-      , view = \_ -> do
+      , view = do
           before <- readTVar started
-          pure $
+          pure . View $ \_ ->
             readTVar newest >>= \case
               Just (number, read') | number > before -> either throwSTM pure read'
               _ -> retry
@@ -199,7 +213,7 @@ elapsed seconds = Signal $ do
           , prepare = pure ()
           , work = \_ -> sleepUntil deadline >> atomically (writeTVar over True)
           }
-  pure (pure ()) {workers = [clock], view = \_ -> pure (readTVar over)}
+  pure (pure ()) {workers = [clock], view = pure (View (\_ -> readTVar over))}
 
 -- | Fails the operator when a polled reading of the signal takes longer than so
 -- many seconds (more than zero).
@@ -232,17 +246,15 @@ staleAfter limit signal = Signal $ do
           when still retry
           calm
       calm = modifyTVar' overdue (\n -> if odd n then n + 1 else n)
-      fresh look = do
-        before <- readTVar overdue
-        pure $ do
-          n <- readTVar overdue
-          when (odd n || n > before) . failWith $
-            "no reading of the signal within " ++ show limit ++ " s"
-          look
+      inTime before value = do
+        n <- readTVar overdue
+        when (odd n || n > before) . failWith $
+          "no reading of the signal within " ++ show limit ++ " s"
+        value
   pure
     source
       { workers = Worker "staleAfter" calm (const watchdog) : workers source
-      , view = \moment -> view source moment >>= fresh
+      , view = looking . inTime <$> readTVar overdue <*> view source
       }
 
 -- | A change counts only once it has lasted for so many seconds (zero or more);
@@ -259,11 +271,11 @@ debounce seconds signal = Signal $ do
   settled <- newTVarIO Nothing
   pending <- newTVarIO Nothing -- a value that differs, and since when
   let noticing = do
-        look <- quietly <$> atomically (view source First)
-        first <- atomically look
+        value <- quietly <$> atomically (view source)
+        first <- atomically value
         atomically (writeTVar settled (Just first))
         let next old = do
-              new <- atomically (look >>= \value -> check (value /= old) >> pure value)
+              new <- atomically (value >>= \v -> check (v /= old) >> pure v)
               t <- now
               atomically $ do
                 isSettled <- (== Just new) <$> readTVar settled
@@ -271,11 +283,11 @@ debounce seconds signal = Signal $ do
               next new
         next first
       settling = forever $ do
-        candidate@(value, since) <- atomically (readTVar pending >>= maybe retry pure)
+        candidate@(new, since) <- atomically (readTVar pending >>= maybe retry pure)
         sleepUntil (since + seconds)
         atomically $ do
           lasted <- (== Just candidate) <$> readTVar pending
-          when lasted (writeTVar settled (Just value) >> writeTVar pending Nothing)
+          when lasted (writeTVar settled (Just new) >> writeTVar pending Nothing)
       forgetAll = writeTVar settled Nothing >> writeTVar pending Nothing
   pure
     source
@@ -285,7 +297,7 @@ debounce seconds signal = Signal $ do
                , Worker "debounce clock" (pure ()) (const settling)
                ]
       , -- The look at the source itself is for what it throws.
-        view = fmap (fmap (*> (readTVar settled >>= maybe retry pure))) (view source)
+        view = looking (*> (readTVar settled >>= maybe retry pure)) <$> view source
       }
 
 -- | @hysteresis low high signal@ becomes true when the signal reaches @high@, and
@@ -307,29 +319,29 @@ hysteresis low high signal = Signal $ do
     "hysteresis: the lower threshold must not be above the upper one"
   source <- open signal
   memory <- newTVarIO False
-  let state look = do
-        value <- look
+  let state value = do
+        v <- value
         before <- readTVar memory
-        pure (value >= high || (before && value > low))
+        pure (v >= high || (before && v > low))
       -- What a look finds out is lost when the operator goes on waiting, so a
       -- thread of its own remembers it.
       remembering = do
-        look <- quietly <$> atomically (view source First)
+        value <- quietly <$> atomically (view source)
         forever . atomically $ do
           before <- readTVar memory
-          after <- state look
+          after <- state value
           check (after /= before)
           writeTVar memory after
   pure
     source
       { workers = workers source ++ [Worker "hysteresis" (pure ()) (const remembering)]
-      , view = fmap (fmap state) (view source)
+      , view = looking state <$> view source
       }
 
 -- | A look for those who wait for values only: what it throws is for the operator,
 -- which looks for itself.
-quietly :: STM a -> STM a
-quietly look = look `catchSTM` \(_ :: SomeException) -> retry
+quietly :: View a -> STM a
+quietly v = look v First `catchSTM` \(_ :: SomeException) -> retry
 
 -- | Opens the sources of a signal once, for all its occurrences in a behaviour.
 --
@@ -354,8 +366,8 @@ withShared signal body = structured $ \scope -> do
   let shared = Signal $ do
         atomically stillOpen
         running <- atomically (readTMVar others)
-        let attended look = stillOpen >> for_ running unlessLost >> look
-        pure source {workers = [], view = fmap (fmap attended) (view source)}
+        let attended value = stillOpen >> for_ running unlessLost >> value
+        pure source {workers = [], view = looking attended <$> view source}
       stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
   -- The body comes first, so that its fault is the leftmost.
   main <- branch scope (Label "withShared" "body") (body shared)
