@@ -46,10 +46,11 @@
 -- branch complete or fail? (On a tie the left one.) Did a sensor fail? Did the
 -- condition change?
 --
--- Two limits that are GHC's: a loop that never allocates can not be stopped (compile
--- it with @-fno-omit-yields@), and a behaviour can not count on recovering from
--- 'Control.Exception.BlockedIndefinitelyOnMVar', since whoever waits for it is told
--- of the deadlock too.
+-- Two limits are GHC's. What never reaches a point where it could be interrupted is
+-- not: a loop that never allocates (compile it with @-fno-omit-yields@), a safe
+-- foreign call (import it @interruptible@). And a behaviour can not count on
+-- recovering from 'Control.Exception.BlockedIndefinitelyOnMVar' and its like, since
+-- whoever waits for it is told of the deadlock too.
 module Behavior
   ( -- * Behaviours
     Behavior

@@ -1,3 +1,4 @@
+{-# LANGUAGE CPP #-}
 {-# LANGUAGE FlexibleInstances #-}
 {-# LANGUAGE MultiParamTypeClasses #-}
 {-# LANGUAGE TypeFamilies #-}
@@ -31,10 +32,12 @@
 -- * 'throw' and 'catch'.
 --
 -- Nothing is implemented anew: every overloaded name stands for one of "Behavior" or
--- of the Prelude, chosen by the type of the first argument alone. All other types
--- follow from that, which is why listings need no annotations; and it is why the
--- type of that argument must be known. (@5 > 3@ does not compile here: it might be
--- anything that numbers can be. In code of your own, use "Behavior".)
+-- of the Prelude, chosen by the type of its first argument alone. All other types
+-- follow from that, which is why listings need no annotations.
+--
+-- It is also why the type of the first argument of 'fallback', 'attempt' and '>' must
+-- be known: @5 > 3@ does not compile here, nor does @fallback failed (return 1)@. In
+-- code of your own, use "Behavior".
 --
 -- Not everything that the paper prints means what its text says; see the table of
 -- errata that comes with this package.
@@ -56,9 +59,12 @@ module Behavior.Paper
 
     -- * The rest of the language
   , module Behavior
+#ifndef __HADDOCK_VERSION__
+    -- Haddock would list the whole Prelude here.
   , throw
   , catch
   , module Prelude
+#endif
   ) where
 
 import Control.Exception (catch, throw)
@@ -126,7 +132,7 @@ instance Condition Bool where
   (&) = (&&)
 
 -- | For @'Behavior' Bool@.
-instance a ~ Bool => Condition (IO a) where
+instance (m ~ Behavior, a ~ Bool) => Condition (m a) where
   holds = id
   not = fmap Prelude.not
   left & right = left >>= \l -> if l then right else pure False
@@ -161,7 +167,7 @@ instance Conditional Bool r where
   ifThenElse condition yes no = if condition then yes else no
 
 -- | For @'Behavior' Bool@.
-instance (a ~ Bool, r ~ Behavior b) => Conditional (IO a) r where
+instance (m ~ Behavior, a ~ Bool, r ~ Behavior b) => Conditional (m a) r where
   ifThenElse condition yes no = condition >>= \c -> if c then yes else no
 
 -- | @unless condition act@ tests the condition, once, and runs @act@ if it is false.

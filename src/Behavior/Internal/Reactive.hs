@@ -52,12 +52,11 @@ react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react operator signal reaction = structured $ \scope -> do
   source <- open signal
   let begin moment = do
-        sensors <- startWorkers scope operator source
-        choose sensors moment
+        (seen, sensors) <- startWorkers scope operator source
+        choose sensors seen moment
 
       -- Nothing runs: read, and do what the value says now.
-      choose sensors moment = do
-        seen <- atomically (view source)
+      choose sensors seen moment = do
         let value = (for_ sensors unlessLost >>) . look seen
         trySynchronous (atomically (value moment)) >>= obeying sensors (value Later)
 
@@ -96,7 +95,10 @@ react operator signal reaction = structured $ \scope -> do
         _ ->
           stopping ([] `and'` running) >>= \case
             -- Read again: by now the value may be another, or the old one again.
-            Stopped _ -> forget scope running >> choose sensors Later
+            Stopped _ -> do
+              forget scope running
+              seen <- atomically (view source)
+              choose sensors seen Later
             ended -> pure (settle ended)
        where
         others `and'` b = map SomeBranch others ++ [SomeBranch b]

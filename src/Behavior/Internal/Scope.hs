@@ -68,6 +68,7 @@ data Branch a = Branch
   -- ^ How the branch ended; retries until it has.
   }
 
+-- | A branch, whatever it returns.
 data SomeBranch = forall a. SomeBranch (Branch a)
 
 -- | How a branch ended.

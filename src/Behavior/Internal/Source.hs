@@ -113,10 +113,9 @@ data Moment
 -- | A thread that a source needs while it is looked at.
 data Worker = Worker
   { workerName :: String
-  , prepare :: STM ()
-  -- ^ Run before each start; a worker is started again after a pause.
-  , work :: IO Bool -> IO ()
-  -- ^ Given whether it was asked to stop; runs until then.
+  , work :: STM (IO Bool -> IO ())
+  -- ^ What to run, until it is asked to stop (it can see whether it was). A worker
+  -- may be started again after a pause; the transaction prepares each start.
   }
 
 -- | The value that a transaction gives: event-driven. It reacts to the very
@@ -184,14 +183,10 @@ polling every act = Signal $ do
   pure
     Source
       { workers =
-          [ Worker
-              { workerName = "polling"
-              , prepare = writeTVar underWay Nothing
-              , work = \asked -> do
-                  t <- now
-                  slot <- atomically (readTVar nextSlot)
-                  readAt (maybe t (max t) slot) asked
-              }
+          [ Worker "polling" $ do
+              writeTVar underWay Nothing
+              slot <- readTVar nextSlot
+              pure $ \asked -> now >>= \t -> readAt (maybe t (max t) slot) asked
           ]
       , view = do
           before <- readTVar started
@@ -207,13 +202,8 @@ elapsed :: Seconds -> Signal Bool
 elapsed seconds = Signal $ do
   over <- newTVarIO (seconds <= 0)
   deadline <- (+ seconds) <$> now
-  let clock =
-        Worker
-          { workerName = "clock"
-          , prepare = pure ()
-          , work = \_ -> sleepUntil deadline >> atomically (writeTVar over True)
-          }
-  pure (pure ()) {workers = [clock], view = pure (View (\_ -> readTVar over))}
+  let clock = sleepUntil deadline >> atomically (writeTVar over True)
+  pure (pure ()) {workers = [Worker "clock" (pure (const clock))], view = pure (View (\_ -> readTVar over))}
 
 -- | Fails the operator when a polled reading of the signal takes longer than so
 -- many seconds (more than zero).
@@ -253,7 +243,7 @@ staleAfter limit signal = Signal $ do
         value
   pure
     source
-      { workers = Worker "staleAfter" calm (const watchdog) : workers source
+      { workers = Worker "staleAfter" (const watchdog <$ calm) : workers source
       , view = looking . inTime <$> readTVar overdue <*> view source
       }
 
@@ -270,8 +260,7 @@ debounce seconds signal = Signal $ do
   source <- open signal
   settled <- newTVarIO Nothing
   pending <- newTVarIO Nothing -- a value that differs, and since when
-  let noticing = do
-        value <- quietly <$> atomically (view source)
+  let noticing value = do
         first <- atomically value
         atomically (writeTVar settled (Just first))
         let next old = do
@@ -293,8 +282,8 @@ debounce seconds signal = Signal $ do
     source
       { workers =
           workers source
-            ++ [ Worker "debounce" forgetAll (const noticing)
-               , Worker "debounce clock" (pure ()) (const settling)
+            ++ [ Worker "debounce" (forgetAll >> const . noticing . quietly <$> view source)
+               , Worker "debounce clock" (pure (const settling))
                ]
       , -- The look at the source itself is for what it throws.
         view = looking (*> (readTVar settled >>= maybe retry pure)) <$> view source
@@ -325,16 +314,14 @@ hysteresis low high signal = Signal $ do
         pure (v >= high || (before && v > low))
       -- What a look finds out is lost when the operator goes on waiting, so a
       -- thread of its own remembers it.
-      remembering = do
-        value <- quietly <$> atomically (view source)
-        forever . atomically $ do
-          before <- readTVar memory
-          after <- state value
-          check (after /= before)
-          writeTVar memory after
+      remembering value = forever . atomically $ do
+        before <- readTVar memory
+        after <- state value
+        check (after /= before)
+        writeTVar memory after
   pure
     source
-      { workers = workers source ++ [Worker "hysteresis" (pure ()) (const remembering)]
+      { workers = workers source ++ [Worker "hysteresis" (const . remembering . quietly <$> view source)]
       , view = looking state <$> view source
       }
 
@@ -371,17 +358,21 @@ withShared signal body = structured $ \scope -> do
       stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
   -- The body comes first, so that its fault is the leftmost.
   main <- branch scope (Label "withShared" "body") (body shared)
-  running <- startWorkers scope "withShared" source
+  (_, running) <- startWorkers scope "withShared" source
   atomically (putTMVar others running)
   (settle <$> atomically (outcome main)) `finally` atomically (writeTVar closed True)
  where
   closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"
 
--- | Starts what must run while the source is looked at.
-startWorkers :: Scope -> String -> Source a -> IO [Branch ()]
+-- | Starts what must run while the source is looked at, and gives a view of it. The
+-- view comes first, and so do those of the workers: else they might just miss the
+-- first reading, and wait for a second one.
+startWorkers :: Scope -> String -> Source a -> IO (View a, [Branch ()])
 startWorkers scope operator source = do
-  atomically (for_ (workers source) prepare)
-  for (workers source) $ \w -> worker scope (Label operator (workerName w)) (work w)
+  (seen, works) <- atomically ((,) <$> view source <*> traverse work (workers source))
+  running <- for (zip (workers source) works) $ \(w, run) ->
+    worker scope (Label operator (workerName w)) run
+  pure (seen, running)
 
 -- | Throws what a worker threw that has died of it.
 unlessLost :: Branch () -> STM ()
