@@ -14,7 +14,7 @@ help:
 
 demo:
 	@.ci/exec door-battery --front locked --back locked --battery 15 --drain 2 \
-	  --charge 40 --threshold 10 --action 1 --speed 10
+	  --charge 40 --threshold 10 --action 1 --speed 3
 
 test:
 	@.ci/test $(ARGS)

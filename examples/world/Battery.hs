@@ -3,10 +3,12 @@
 -- level is computed when it is asked for, so that nothing has to tick.
 module Battery
   ( Battery
-  , battery
+  , charged
   , levelAt
+  , wholePercent
   , withLevel
   , withRate
+  , filled
   , lasts
   , untilFull
   ) where
@@ -23,20 +25,30 @@ data Battery = Battery
   deriving (Eq, Show)
 
 -- | A battery of this level at the time 0, which keeps it.
-battery :: Double -> Battery
-battery percent = Battery {level = percent, rate = 0, since = 0}
+charged :: Double -> Battery
+charged percent = Battery {level = percent, rate = 0, since = 0}
 
 levelAt :: Seconds -> Battery -> Double
 levelAt t b = max 0 (min 100 (level b + rate b * realToFrac (t - since b)))
+
+-- | A level as it is read: whole percents, of a level known to a tenth.
+wholePercent :: Double -> Int
+wholePercent percent = round (percent * 10) `div` 10
 
 -- | The battery, from this moment on with another level.
 withLevel :: Seconds -> Double -> Battery -> Battery
 withLevel t percent b = b {level = percent, since = t}
 
--- | The battery, from this moment on with another rate.
+-- | The battery, from this moment on with another rate; but an empty one stays empty.
 withRate :: Seconds -> Double -> Battery -> Battery
 withRate t percentASecond b =
-  Battery {level = levelAt t b, rate = percentASecond, since = t}
+  Battery {level = levelNow, rate = if levelNow > 0 then percentASecond else 0, since = t}
+ where
+  levelNow = levelAt t b
+
+-- | The battery, full; it must not be draining.
+filled :: Battery -> Battery
+filled b = b {level = 100}
 
 -- | How long it lasts from this moment on: until it is empty.
 lasts :: Seconds -> Battery -> Seconds

@@ -1,0 +1,193 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- The command line of @door-battery@.
+module Options
+  ( Options (..)
+  , Program (..)
+  , parse
+  ) where
+
+import Control.Monad (mfilter)
+import Data.Char (isDigit)
+import Data.List (intercalate, stripPrefix)
+import Options.Applicative
+import Text.Read (readMaybe)
+
+import World (DoorState (..))
+
+data Options = Options
+  { front :: DoorState
+  , back :: DoorState
+  , batteryPercent :: Int
+  , drainRate :: Double
+  , chargeRate :: Double
+  , lowBelow :: Int
+  , actionSeconds :: Double
+  , program :: Program
+  , speedFactor :: Double
+  , seed :: Maybe Integer
+  }
+  deriving (Eq, Show)
+
+-- | The versions of the program that are in the paper.
+data Program = First | WithDo | OverDoors | WithAttempts | Introduction
+  deriving (Eq, Show, Enum, Bounded)
+
+-- | Reads the arguments. The result of anything wrong with them has the exit code 2,
+-- and a message that says what would be right.
+parse :: [String] -> ParserResult Options
+parse arguments = execParserPure defaultPrefs commandLine arguments >>= honest
+ where
+  honest o
+    | lowBelow o /= printedThreshold && program o `notElem` [First, WithDo] =
+        refuse $
+          "option --threshold: program " ++ programName (program o) ++ " is printed with a \
+          \threshold of its own; allowed: " ++ show printedThreshold
+    | otherwise = pure o
+  refuse why = Failure (parserFailure defaultPrefs commandLine (ErrorMsg why) [])
+
+commandLine :: ParserInfo Options
+commandLine =
+  info (helper <*> options) $
+    fullDesc
+      <> failureCode 2
+      <> progDesc
+        "A robot must enter a room by one of two doors and do its task there, and never \
+        \run out of battery: the example of Biggar and Shames, in a mock world."
+      <> footer
+        "Exit status: 0 when the task is done, 1 when the robot failed, 2 for bad options, \
+        \3 for a fault of the world (the battery is flat), 130 or 143 when stopped by \
+        \SIGINT (Ctrl-C) or SIGTERM."
+
+options :: Parser Options
+options =
+  Options
+    <$> given "front" "STATE" doorState Locked ("the front door: " ++ allowed doorState)
+    <*> given "back" "STATE" doorState Locked "the back door, likewise"
+    <*> given "battery" "PERCENT" percent 13 "level of the battery at the start"
+    <*> given "drain" "PERCENT" amount 4 "what it loses in a second"
+    <*> given "charge" "PERCENT" factor 50 "what it gains in a second of charging"
+    <*> given "threshold" "PERCENT" percent printedThreshold
+      "level below which it is low, for programs 1 and 2 (the others are printed with 10)"
+    <*> given "action" "SECONDS" amount 0.5 "how long an action takes"
+    <*> given "program" "NAME" aProgram WithDo 
+      ("version of the paper: " ++ allowed aProgram ++ "; 1 is kept as printed: if the front \
+       \door is open it opens it, if not it goes on without")
+    <*> given "speed" "FACTOR" factor 1
+      "how much faster than real time (the battery is read every 10 ms of real time)"
+    <*> optional
+      (option (reader wholeNumber) . mconcat $
+        [ long "seed"
+        , metavar "N"
+        , help "vary the length of every action but recharge by up to 20 %, each N in its own way"
+        ])
+ where
+  given name meta kind byDefault what =
+    option (reader kind) . mconcat $
+      [ long name
+      , metavar meta
+      , value byDefault
+      , showDefaultWith (written kind)
+      , help what
+      ]
+
+-- | A kind of value that can be given on the command line.
+data Kind a = Kind
+  { noun :: String
+  , allowed :: String
+  , recognised :: String -> Maybe a
+  , written :: a -> String
+  }
+
+reader :: Kind a -> ReadM a
+reader kind = eitherReader $ \word -> maybe (Left (wrong word)) Right (recognised kind word)
+ where
+  wrong word = show word ++ " is not " ++ noun kind ++ "; allowed: " ++ allowed kind
+
+doorState :: Kind DoorState
+doorState =
+  Kind
+    { noun = "a state of a door"
+    , allowed =
+        "open, closed, locked (opening fails, smashing works), \
+        \jammed:N (the first N tries to open fail), sealed (neither works)"
+    , recognised = \case
+        "open" -> Just Open
+        "closed" -> Just Closed
+        "locked" -> Just Locked
+        "sealed" -> Just Sealed
+        word -> stripPrefix "jammed:" word >>= fmap (Jammed . fromInteger) . digits
+    , written = \case
+        Open -> "open"
+        Closed -> "closed"
+        Locked -> "locked"
+        Jammed n -> "jammed:" ++ show n
+        Sealed -> "sealed"
+    }
+
+aProgram :: Kind Program
+aProgram =
+  Kind
+    { noun = "a program"
+    , allowed = intercalate ", " (map programName [minBound ..])
+    , recognised = \word -> lookup word [(programName p, p) | p <- [minBound ..]]
+    , written = programName
+    }
+
+programName :: Program -> String
+programName = \case
+  First -> "1"
+  WithDo -> "2"
+  OverDoors -> "3"
+  WithAttempts -> "4"
+  Introduction -> "intro"
+
+-- | The threshold that programs 3, 4 and intro have in their text.
+printedThreshold :: Int
+printedThreshold = 10
+
+percent :: Kind Int
+percent =
+  Kind
+    { noun = "a level of a battery"
+    , allowed = "a whole number from 0 to 100"
+    , recognised = fmap fromInteger . mfilter (<= 100) . digits
+    , written = show
+    }
+
+wholeNumber :: Kind Integer
+wholeNumber =
+  Kind
+    { noun = "a whole number"
+    , allowed = "0, 1, 2 and so on"
+    , recognised = digits
+    , written = show
+    }
+
+amount :: Kind Double
+amount =
+  Kind
+    { noun = "an amount"
+    , allowed = "a number from 0 to 1000000"
+    , recognised = number (\n -> n >= 0 && n <= 1000000)
+    , written = show
+    }
+
+factor :: Kind Double
+factor =
+  Kind
+    { noun = "an amount"
+    , allowed = "a number greater than 0, up to 1000000"
+    , recognised = number (\n -> n > 0 && n <= 1000000)
+    , written = show
+    }
+
+digits :: String -> Maybe Integer
+digits word
+  | not (null word) && all isDigit word = readMaybe word
+  | otherwise = Nothing
+
+-- | A number that is right. NaN never is.
+number :: (Double -> Bool) -> String -> Maybe Double
+number right = mfilter right . readMaybe
