@@ -1,10 +1,11 @@
-.PHONY: help demo test warnings doctest lint docs check matrix ci clean
+.PHONY: help demo test warnings doctest readme lint docs check matrix ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
 	@echo 'make test      the test suite, under three runtimes (ARGS="-m NAME" selects tests)'
 	@echo 'make warnings  build everything with warnings as errors'
 	@echo 'make doctest   run the examples in the documentation'
+	@echo 'make readme    run the program in README.md'
 	@echo 'make lint      hlint'
 	@echo 'make docs      the documentation, which must cover every export'
 	@echo 'make check     what cabal has to say about the package'
@@ -19,7 +20,7 @@ demo:
 test:
 	@.ci/test $(ARGS)
 
-warnings doctest lint docs check:
+warnings doctest readme lint docs check:
 	@.ci/$@
 
 matrix:

@@ -28,7 +28,7 @@
 -- 4. /No lost fault./ A fault of a branch, also while it is being stopped, always
 --    gets out.
 -- 5. /Interruptible./ What runs in a thread of its own (every branch, and
---    'monitor''s recovery) runs unmasked, whatever the caller's masking state. '?',
+--    the recovery of 'monitor') runs unmasked, whatever the caller's masking state. '?',
 --    'attempt' and 'fallbackOver' keep the caller's.
 -- 6. /Together./ What has to stop is asked all at once, then waited for.
 -- 7. /Constant space./ A million reselections, recoveries, retries or alternatives

@@ -56,7 +56,7 @@ parallel :: Behavior a -> Behavior b -> Behavior ()
 parallel left right =
   race [(Label "parallel" "left", void left), (Label "parallel" "right", void right)]
 
--- | 'parallel' as an operator. It binds looser than '?' and tighter than
+-- | 'parallel' as an operator. It binds looser than @?@ and tighter than
 -- 'Prelude.>>'. (@Control.Arrow@ has another function of this name.)
 --
 -- >>> sleep 3600 ||| putStrLn "beep"

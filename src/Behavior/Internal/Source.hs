@@ -249,7 +249,7 @@ staleAfter limit signal = Signal $ do
 
 -- | A change counts only once it has lasted for so many seconds (zero or more);
 -- until then the signal keeps its value. Its first value counts at once, and so
--- does the first after a time when nobody watched ('monitor''s recovery).
+-- does the first after a time when nobody watched (as during a recovery).
 --
 -- >>> Signal.waitUntil (Signal.debounce 0.5 (pure True))
 --
