@@ -39,8 +39,8 @@
 -- be known: @5 > 3@ does not compile here, nor does @fallback failed (return 1)@. In
 -- code of your own, use "Behavior".
 --
--- Not everything that the paper prints means what its text says; see the table of
--- errata that comes with this package.
+-- Not everything that the paper prints does what its text says: the table of errata,
+-- @docs/errata.md@, lists what does not.
 module Behavior.Paper
   ( -- * Conditions
     Condition (..)

@@ -1,0 +1,10 @@
+{-# LANGUAGE RebindableSyntax #-}
+{-# OPTIONS_GHC -w #-}
+
+-- | Section 6: a condition built from what another behaviour returns.
+module Paper.BatteryLow where
+
+import Behavior.Paper
+import Robot hiding (batteryLow)
+
+batteryLow = (<10) <$> batteryLevel

@@ -1,0 +1,10 @@
+{-# LANGUAGE RebindableSyntax #-}
+{-# OPTIONS_GHC -w #-}
+
+-- | Section 4.1: a condition that fails is not one that is false.
+module Paper.DangerNearby where
+
+import Behavior.Paper
+import Robot
+
+bt = monitor dangerNearby hide doTask

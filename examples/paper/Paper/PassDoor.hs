@@ -1,0 +1,16 @@
+{-# LANGUAGE RebindableSyntax #-}
+{-# OPTIONS_GHC -w #-}
+
+-- | Section 3.1: a robot that passes through a door and closes it behind it, as nested
+-- reactive selections.
+--
+-- The words are the paper's; the parentheses around the third argument of each
+-- @rSelect@ are ours, without them it does not compile.
+module Paper.PassDoor where
+
+import Behavior.Paper
+import Robot
+
+passDoor = rSelect (insideRoom & doorClosed) doTask
+            (rSelect insideRoom (close door)
+             (rSelect doorClosed (open door) (passThrough door)))

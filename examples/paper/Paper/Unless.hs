@@ -1,0 +1,10 @@
+{-# LANGUAGE RebindableSyntax #-}
+{-# OPTIONS_GHC -w #-}
+
+-- | Section 3.3, footnote: the same, more neatly. The paper gives the expression.
+module Paper.Unless where
+
+import Behavior.Paper
+import Robot
+
+bt = do unless insideRoom (passThrough door); close door

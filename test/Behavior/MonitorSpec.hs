@@ -1,0 +1,212 @@
+-- |
+-- 'Signal.monitor' on conditions that are watched: its latch, and what may interrupt
+-- what. What it has in common with the other operators is in "Behavior.ReactiveSpec",
+-- and how it ends when several things happen in "Behavior.OutcomeSpec".
+module Behavior.MonitorSpec (spec) where
+
+import Control.Concurrent (yield)
+import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception
+import Control.Monad (replicateM_, unless, when)
+import Data.Foldable (for_)
+import Test.Hspec
+import Test.Hspec.QuickCheck (prop)
+import Test.QuickCheck (NonNegative (..), ioProperty, (===))
+
+import Behavior.Internal.Runtime (atomically)
+import qualified Behavior.Signal as Signal
+import Support
+import Watched
+
+spec :: Spec
+spec = guarded . describe "monitor" $ do
+  it "reads the condition first: when it is true, the recovery runs before the task" $ do
+    book <- newNotebook
+    dial <- newDial True
+    let recovery = note book "recovery" >> set dial (Says False)
+    Signal.monitor (watched dial) recovery (note book "task")
+    notes book `shouldReturn` ["recovery", "task"]
+
+  -- The task asks for as many recoveries in a row as the script says, again and again.
+  prop "recovers until the condition is false, and begins the task anew" $ \script ->
+    ioProperty $ do
+      book <- newNotebook
+      left <- newTVarIO (map getNonNegative script :: [Int])
+      needed <- newTVarIO 0
+      let task = do
+            note book "task"
+            over <- atomically $ do
+              counts <- readTVar left
+              writeTVar left (drop 1 counts)
+              null counts <$ for_ (take 1 counts) (writeTVar needed . (+ 1))
+            unless over hang
+          recovery = note book "recovery" >> atomically (modifyTVar' needed (subtract 1))
+      Signal.monitor ((> 0) <$> dialled needed) recovery task
+      let expected = concatMap (\n -> "task" : replicate (n + 1) "recovery") (map getNonNegative script)
+      (expected ++ ["task"] ===) <$> notes book
+
+  it "recovers even if the condition is false again when the task has ended" $ do
+    book <- newNotebook
+    dial <- newDial False
+    entered <- newGate
+    let task = do
+          again <- (/= []) <$> notes book
+          note book "task"
+          unless again $ (open entered >> hang) `onException` set dial (Says False)
+    launching (Signal.monitor (watched dial) (note book "recovery") task) $ \caller -> do
+      pass entered
+      set dial (Says True)
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["task", "recovery", "task"]
+
+  it "starts the recovery only after the task, cleanup included, has ended" $ do
+    book <- newNotebook
+    dial <- newDial False
+    entered <- newGate
+    cleaning <- newGate
+    release <- newGate
+    let task = do
+          again <- (/= []) <$> notes book
+          unless again $ do
+            note book "task"
+            (open entered >> hang) `onException` do
+              open cleaning
+              pass release
+              note book "task is over"
+        recovery = note book "recovery" >> set dial (Says False)
+    launching (Signal.monitor (watched dial) recovery task) $ \caller -> do
+      pass entered
+      set dial (Says True)
+      pass cleaning
+      stillRunning caller
+      open release
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["task", "task is over", "recovery"]
+
+  it "runs the recovery to completion, whatever the condition says meanwhile" $ do
+    book <- newNotebook
+    dial <- newDial True
+    entered <- newGate
+    release <- newGate
+    let recovery =
+          (open entered >> pass release >> note book "recovered")
+            `onException` note book "interrupted"
+        task = note book "task"
+    launching (Signal.monitor (watched dial) recovery task) $ \caller -> do
+      pass entered
+      for_ [Says False, Says True, SaysFailure, SaysFault, SaysNothing, Says False] $ \news -> do
+        set dial news
+        stillRunning caller
+      open release
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["recovered", "task"]
+
+  for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
+    it ("starts nothing when after the recovery the condition says " ++ show news) $ do
+      book <- newNotebook
+      dial <- newDial True
+      let recovery = note book "recovery" >> set dial news
+      end <- ending (Signal.monitor (watched dial) recovery (note book "task"))
+      end `shouldBe` case news of
+        SaysFailure -> FailedWith "FailedBecause \"the sensor\""
+        SaysFault -> FaultedWith (show (Fault "the sensor"))
+        _ -> FailedWith "FailedBecause \"the signal has no value any more\""
+      notes book `shouldReturn` ["recovery"]
+
+  it "never runs task and recovery at once, however often it recovers" $ do
+    room <- newRoom
+    dial <- newTVarIO False
+    works <- newTVarIO False
+    over <- newGate
+    let task =
+          inside room $
+            (atomically (writeTVar works True) >> pass over)
+              `onException` (replicateM_ 3 yield >> atomically (writeTVar works False))
+        recovery = inside room (replicateM_ 3 yield >> atomically (writeTVar dial False))
+    launching (Signal.monitor (dialled dial) recovery task) $ \caller -> do
+      for_ [1 .. 3000 :: Int] $ \n -> do
+        atomically (writeTVar dial True)
+        -- Two times of three the task may come to run.
+        unless (n `mod` 3 == 0) . atomically $
+          (&&) <$> readTVar works <*> (not <$> readTVar dial) >>= check
+      open over
+      awaitEnd caller `shouldReturn` Gave ()
+    mostInside room `shouldReturn` 1
+
+  it "interrupts, as the outer one, the recovery of an inner one" $ do
+    book <- newNotebook
+    danger <- newDial False
+    low <- newDial True
+    entered <- newGate
+    let flee = note book "flee" >> set danger (Says False)
+        recharge = do
+          again <- (/= []) <$> notes book
+          note book "recharge"
+          unless again ((open entered >> hang) `onException` note book "unplug")
+          set low (Says False)
+        task = note book "task"
+        inner = Signal.monitor (watched low) recharge task
+    launching (Signal.monitor (watched danger) flee inner) $ \caller -> do
+      pass entered
+      set danger (Says True)
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["recharge", "unplug", "flee", "recharge", "task"]
+
+  it "does not let an inner one interrupt the recovery of the outer one" $ do
+    book <- newNotebook
+    danger <- newDial False
+    low <- newDial False
+    let flee = do
+          note book "flee"
+          set low (Says True)
+          note book "safe"
+          set danger (Says False)
+        recharge = note book "recharge" >> set low (Says False)
+        task = do
+          again <- (> 1) . length <$> notes book
+          note book "task"
+          unless again (set danger (Says True) >> hang)
+    Signal.monitor (watched danger) flee (Signal.monitor (watched low) recharge task)
+    notes book `shouldReturn` ["task", "flee", "safe", "recharge", "task"]
+
+  for_ [minBound .. maxBound] $ \how ->
+    it ("is cancelled, when its recovery then " ++ manner how) $ do
+      book <- newNotebook
+      dial <- newDial True
+      entered <- newGate
+      let recovery = () <$ onStop how "recovery" (open entered >> hang)
+          act = leavingNothing (Signal.monitor (watched dial) recovery (note book "task"))
+      cancelling act (pass entered) `shouldReturn` case how of
+        Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "recovery"))
+        _ -> CancelledBy (show (Cancel "the caller"))
+      notes book `shouldReturn` []
+
+  it "does not recover when it is cancelled while the task stops" $ do
+    book <- newNotebook
+    dial <- newDial False
+    entered <- newGate
+    cleaning <- newGate
+    release <- newGate
+    let task =
+          (open entered >> hang) `onException` do
+            open cleaning
+            -- Interruptible; but nobody asks a second time.
+            pass release
+            note book "task is over"
+    launching (Signal.monitor (watched dial) (note book "recovery") task) $ \caller -> do
+      pass entered
+      set dial (Says True)
+      pass cleaning
+      throwing (asyncThreadId caller) (Cancel "the caller")
+      open release
+      end <- awaitEnd caller
+      when (end /= CancelledBy (show (Cancel "the caller"))) $
+        expectationFailure (show (end :: Ending ()))
+    notes book `shouldReturn` ["task is over"]
+ where
+  manner how = case how of
+    Cleanly -> "stops"
+    Completing -> "completes all the same"
+    Failing -> "fails"
+    Faulting -> "faults: with both"

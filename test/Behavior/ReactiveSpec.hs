@@ -1,0 +1,405 @@
+-- |
+-- The reactive operators on conditions that are watched. How each ends when several
+-- things happen is in "Behavior.OutcomeSpec"; 'Signal.monitor' has a spec of its own.
+module Behavior.ReactiveSpec (spec) where
+
+import Control.Concurrent (yield)
+import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception
+import Control.Monad (replicateM_, unless, void)
+import Data.Foldable (for_)
+import Data.List (group)
+import Test.Hspec hiding (after, around, before)
+import Test.Hspec.QuickCheck (prop)
+import Test.QuickCheck (NonEmptyList (..), ioProperty, (===))
+
+import Behavior (failWith)
+import Behavior.Internal.Runtime (Event (..), Label (..), atomically, reportingTo)
+import qualified Behavior.Signal as Signal
+import Support
+import Watched
+
+spec :: Spec
+spec = guarded $ do
+  describe "Laws" laws
+  describe "rSelect" selecting
+  describe "Every reactive operator" everyOperator
+  describe "switch" switching
+  describe "teleoReactive" rules
+  describe "waitUntil" waiting
+  describe "whileHolding" holding
+
+laws :: Spec
+laws = do
+  prop "rSelect (pure True) l r is l" $ \l r ->
+    (\n -> Signal.rSelect (pure True) (play n l) (play n r)) `sameAs` (`play` l)
+  prop "rSelect (pure False) l r is r" $ \l r ->
+    (\n -> Signal.rSelect (pure False) (play n l) (play n r)) `sameAs` (`play` r)
+  prop "rSelect c l r is switch c (\\h -> if h then l else r)" $ \c l r ->
+    (\n -> Signal.rSelect (pure c) (play n l) (play n r))
+      `sameAs` (\n -> Signal.switch (pure c) (\h -> play n (if h then l else r)))
+  prop "monitor (pure False) r t is t" $ \r t ->
+    (\n -> Signal.monitor (pure False) (void (play n r)) (play n t)) `sameAs` (`play` t)
+  prop "switch (pure k) b is b k" $ \k ones others ->
+    let scripts key = if key == 'k' then ones else others
+     in (\n -> Signal.switch (pure k) (play n . scripts)) `sameAs` (`play` scripts k)
+  prop "teleoReactive runs the first behaviour whose condition holds" $ \before b after ->
+    let rulesOf n =
+          [(pure False, play n a) | a <- before]
+            ++ (pure True, play n b) : [(pure h, play n a) | (h, a) <- after]
+     in (Signal.teleoReactive . rulesOf) `sameAs` (`play` b)
+  prop "whileHolding (pure True) b is b" $ \b ->
+    (\n -> Signal.whileHolding (pure True) (play n b)) `sameAs` (`play` b)
+  prop "whileHolding (pure False) b fails, and b does not run" $ \b ->
+    (\n -> Signal.whileHolding (pure False) (play n b))
+      `sameAs` const (failWith "the condition does not hold")
+  it "waitUntil (pure True) is pure ()" $
+    Signal.waitUntil (pure True) `shouldReturn` ()
+
+selecting :: Spec
+selecting = do
+  -- Each branch turns the condition to the next value that the script has for it, until
+  -- one is another than its own: then it waits to be stopped.
+  prop "runs what the condition says, change after change" $ \(NonEmpty script) ->
+    ioProperty $ do
+      book <- newNotebook
+      dial <- newTVarIO (head script)
+      rest <- newTVarIO (tail script)
+      let branch own = do
+            note book own
+            over <- atomically $ do
+              (same, others) <- span (== own) <$> readTVar rest
+              writeTVar rest (drop 1 others)
+              case others of
+                [] -> True <$ pure same
+                next : _ -> False <$ writeTVar dial next
+            unless over hang
+      Signal.rSelect (dialled dial) (branch True) (branch False)
+      (map head (group script) ===) <$> notes book
+
+  it "never runs both branches at once, however the condition flickers" $ do
+    room <- newRoom
+    dial <- newTVarIO True
+    runs <- newTVarIO Nothing
+    over <- newGate
+    let branch own =
+          inside room $
+            (atomically (writeTVar runs (Just own)) >> pass over)
+              `onException` replicateM_ 3 yield
+    launching (Signal.rSelect (dialled dial) (branch True) (branch False)) $ \caller -> do
+      for_ [1 .. 3000 :: Int] $ \n -> do
+        atomically (modifyTVar' dial not)
+        -- Two times of three what the condition says may come to run.
+        unless (n `mod` 3 == 0) . atomically $
+          (==) <$> readTVar runs <*> (Just <$> readTVar dial) >>= check
+      open over
+      awaitEnd caller `shouldReturn` Gave ()
+    mostInside room `shouldReturn` 1
+
+  it "runs an instant branch exactly once, however the condition flickers" $ do
+    room <- newRoom
+    dial <- newTVarIO True
+    ran <- newTVarIO (0 :: Int)
+    over <- newTVarIO False
+    let flicker = do
+          atomically (modifyTVar' dial not)
+          readTVarIO over >>= \isOver -> unless isOver flicker
+        branch = inside room (atomically (modifyTVar' ran (+ 1)))
+    launching flicker $ \flickering -> do
+      -- A run that was stopped before it could count is begun anew: every run that
+      -- counts has completed, and must be the only one.
+      replicateM_ 2000 $ Signal.rSelect (dialled dial) (mask_ branch) (mask_ branch)
+      atomically (writeTVar over True)
+      awaitEnd flickering `shouldReturn` Gave ()
+    readTVarIO ran `shouldReturn` 2000
+    mostInside room `shouldReturn` 1
+
+  it "does what the condition says when the old branch has ended, not when it changed" $ do
+    book <- newNotebook
+    dial <- newTVarIO 'a'
+    entered <- newGate
+    cleaning <- newGate
+    release <- newGate
+    let branch 'a' = do
+          note book "a"
+          (open entered >> hang) `onException` do
+            open cleaning
+            pass release
+            note book "a is over"
+        branch key = note book [key]
+    launching (Signal.switch (dialled dial) branch) $ \caller -> do
+      pass entered
+      atomically (writeTVar dial 'b')
+      pass cleaning
+      atomically (writeTVar dial 'c')
+      open release
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["a", "a is over", "c"]
+
+  it "runs the same branch anew when the condition has changed back meanwhile" $ do
+    book <- newNotebook
+    dial <- newTVarIO True
+    entered <- newGate
+    let left =
+          notes book >>= \before ->
+            if null before
+              then do
+                note book "left"
+                -- The cleanup itself turns the condition back.
+                (open entered >> hang) `onException` atomically (writeTVar dial True)
+              else note book "left again"
+        right = note book "right"
+    launching (Signal.rSelect (dialled dial) left right) $ \caller -> do
+      pass entered
+      atomically (writeTVar dial False)
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["left", "left again"]
+
+  for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
+    it ("starts nothing when the condition, read again, says " ++ show news) $ do
+      book <- newNotebook
+      dial <- newDial True
+      entered <- newGate
+      let left = note book "left" >> (open entered >> hang) `onException` set dial news
+          right = note book "right"
+      launching (Signal.rSelect (watched dial) left right) $ \caller -> do
+        pass entered
+        set dial (Says False)
+        awaitEnd caller `shouldReturn` expected news
+      notes book `shouldReturn` ["left"]
+ where
+  expected news = case news of
+    SaysFailure -> FailedWith "FailedBecause \"the sensor\""
+    SaysFault -> FaultedWith (show (Fault "the sensor"))
+    _ -> FailedWith "FailedBecause \"the signal has no value any more\""
+
+everyOperator :: Spec
+everyOperator = for_ operators $ \op -> describe (show op) $ do
+  it "starts nothing before the condition has a value" $ do
+    book <- newNotebook
+    dial <- newTVarIO SaysNothing
+    asked <- newGate
+    let main = note book "main" >> pure "main"
+        other = note book "other" >> pure "other"
+    launching (open asked >> running op (watched dial) main other) $ \caller -> do
+      pass asked
+      stillRunning caller
+      note book "now"
+      set dial (Says True)
+      awaitEnd caller `shouldReturn` Gave "main"
+    notes book `shouldReturn` ["now", "main"]
+
+  for_ [SaysFailure, SaysFault] $ \news ->
+    it ("starts nothing when the condition at first " ++ show news) $ do
+      book <- newNotebook
+      dial <- newTVarIO news
+      let branch = note book "ran" >> pure "ran"
+      ending (running op (watched dial) branch branch) >>= (`shouldSatisfy` sensorsOwn news)
+      notes book `shouldReturn` []
+
+  for_ [("unmasked", id), ("masked", mask_), ("uninterruptible", uninterruptibleMask_)] $
+    \(state, masked) ->
+      it ("runs every branch unmasked for a caller that is " ++ state) $ do
+        states <- newNotebook
+        dial <- newDial True
+        entered <- newGate
+        let noting = getMaskingState >>= note states
+            main = do
+              again <- (/= []) <$> notes states
+              noting
+              if again then pure "main" else open entered >> hang
+            other = noting >> set dial (Says True) >> pure "other"
+        launching (masked (running op (watched dial) main other)) $ \caller -> do
+          pass entered
+          set dial (Says False)
+          void (awaitEnd caller)
+        notes states >>= (`shouldSatisfy` \all' -> not (null all') && all (== Unmasked) all')
+
+  it "ends after the cleanup of its branch, though the caller is cancelled twice" $ do
+    book <- newNotebook
+    dial <- newDial True
+    entered <- newGate
+    cleaning <- newGate
+    release <- newGate
+    let main =
+          uninterruptibly (open entered >> hang) $ do
+            open cleaning
+            pass release
+            note book "main is over"
+        other = pure "other"
+        act = running op (watched dial) main other `onException` note book "operator is over"
+    launching act $ \caller -> do
+      pass entered
+      throwing (asyncThreadId caller) (Cancel "once")
+      pass cleaning
+      throwing (asyncThreadId caller) (Cancel "twice")
+      open release
+      awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "once"))
+    notes book `shouldReturn` ["main is over", "operator is over"]
+
+  for_ [1 .. 3] $ \level -> do
+    it ("nested in itself three times, is stopped at level " ++ show level) $ do
+      (end, ran) <- nested op level (pure ())
+      (end, ran) `shouldBe` case operator op of
+        "whileHolding" -> (FailedWith "FailedBecause \"the condition does not hold\"", ["main"])
+        "monitor" -> (Gave "main again", ["main", show level, "main again"])
+        _ -> (Gave (show level), ["main", show level])
+    it ("nested in itself three times, throws the fault met by stopping level " ++ show level) $ do
+      (end, ran) <- nested op level (throwIO (Fault "main"))
+      end `shouldBe` FaultedWith (show (Fault "main"))
+      ran `shouldBe` "main" : [show level | operator op == "monitor"]
+
+  it "labels every thread with the operator and its branch" $ do
+    events <- newNotebook
+    dial <- newDial True
+    entered <- newGate
+    visits <- newNotebook
+    let main = do
+          note visits ()
+          again <- (> 1) . length <$> notes visits
+          if again then pure "main" else open entered >> hang
+        other = set dial (Says True) >> pure "other"
+    reportingTo (note events) $
+      launching (running op (watched dial) main other) $ \caller -> do
+        pass entered
+        set dial (Says False)
+        void (awaitEnd caller)
+    reported <- notes events
+    [label | Started label <- reported] `shouldBe` map (Label (operator op)) (branches op)
+    -- Each has ended before the next was started.
+    reported `shouldBe` concat [[Started label, Ended label] | Started label <- reported]
+ where
+  sensorsOwn news end = case (news, end) of
+    (SaysFailure, FailedWith why) -> why == "FailedBecause \"the sensor\""
+    (_, FaultedWith what) -> news == SaysFault && what == show (Fault "the sensor")
+    _ -> False
+  branches op = case operator op of
+    "rSelect" -> ["left", "right"]
+    "monitor" -> ["task", "recovery", "task"]
+    "switch" -> ["branch", "branch"]
+    "teleoReactive" -> ["rule 1", "rule 2"]
+    _ -> ["branch"]
+
+-- | One operator inside another of its kind inside a third; the condition of one of
+-- them, counted from outside, changes while the innermost branch runs.
+nested :: Operator -> Int -> IO () -> IO (Ending String, [String])
+nested op level cleanup = do
+  book <- newNotebook
+  entered <- newGate
+  dials <- traverse (const (newDial True)) [1 .. 3 :: Int]
+  let main = do
+        again <- (/= []) <$> notes book
+        if again
+          then note book "main again" >> pure "main again"
+          else note book "main" >> (open entered >> hang) `onException` cleanup
+      other n dial = do
+        note book (show n)
+        set dial (Says True)
+        pure (show n)
+      around (n, dial) inner = running op (watched dial) inner (other n dial)
+  end <- launching (foldr around main (zip [1 :: Int ..] dials)) $ \caller -> do
+    pass entered
+    set (dials !! (level - 1)) (Says False)
+    awaitEnd caller
+  (,) end <$> notes book
+
+-- | Something of which it is known only whether it is the same.
+data Mode = Search | Fetch | Rest
+  deriving (Eq)
+
+switching :: Spec
+switching =
+  it "has a branch for each value of any type that can be compared" $ do
+    book <- newNotebook
+    mode <- newTVarIO Search
+    let become next = atomically (writeTVar mode next)
+        behave Search = note book "search" >> become Fetch >> hang
+        behave Fetch = note book "fetch" >> become Rest >> hang
+        behave Rest = note book "rest"
+    Signal.switch (dialled mode) behave
+    notes book `shouldReturn` ["search", "fetch", "rest"]
+
+rules :: Spec
+rules = do
+  it "gives way to an earlier rule, and not to a later one" $ do
+    book <- newNotebook
+    [first, second, third] <- traverse newTVarIO [False, True, False]
+    let turn variable = atomically . writeTVar variable
+        one = note book "first"
+        two = do
+          note book "second"
+          turn third True
+          -- If it gave way to the third, it would be stopped before it could say so.
+          mask_ (note book "second goes on")
+          turn first True
+          hang
+        three = note book "third"
+    Signal.teleoReactive (zip (map dialled [first, second, third]) [one, two, three])
+    notes book `shouldReturn` ["second", "second goes on", "first"]
+
+  it "goes on to the next rule that holds when its own no longer does" $ do
+    book <- newNotebook
+    first <- newTVarIO True
+    let one = note book "first" >> atomically (writeTVar first False) >> hang
+    Signal.teleoReactive
+      [(dialled first, one), (pure False, note book "second"), (pure True, note book "third")]
+    notes book `shouldReturn` ["first", "third"]
+
+  it "waits while no rule holds, at first and later" $ do
+    book <- newNotebook
+    hungry <- newTVarIO False
+    tired <- newTVarIO False
+    entered <- newGate
+    let turn variable = atomically . writeTVar variable
+        eat = note book "eat" >> open entered >> hang
+        sleeps = note book "sleep"
+    launching (Signal.teleoReactive [(dialled tired, sleeps), (dialled hungry, eat)]) $ \caller -> do
+      stillRunning caller
+      turn hungry True
+      pass entered
+      turn hungry False
+      stillRunning caller
+      note book "now"
+      turn tired True
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["eat", "now", "sleep"]
+
+  it "fails when a condition does, also while no rule holds" $ do
+    dial <- newDial False
+    launching (Signal.teleoReactive [(watched dial, pure ()), (pure False, pure ())]) $ \caller -> do
+      stillRunning caller
+      set dial SaysFailure
+      awaitEnd caller `shouldReturn` FailedWith "FailedBecause \"the sensor\""
+
+waiting :: Spec
+waiting = do
+  it "returns when the condition holds, and not before" $ do
+    dial <- newDial False
+    launching (Signal.waitUntil (watched dial)) $ \caller -> do
+      stillRunning caller
+      set dial (Says True)
+      awaitEnd caller `shouldReturn` Gave ()
+
+  for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
+    it ("takes for an end, and not for false, that the condition says " ++ show news) $ do
+      dial <- newDial False
+      launching (Signal.waitUntil (watched dial)) $ \caller -> do
+        stillRunning caller
+        set dial news
+        awaitEnd caller >>= (`shouldSatisfy` (/= Gave ()))
+
+  it "can be cancelled" $ do
+    dial <- newDial False
+    cancelling (Signal.waitUntil (watched dial)) (pure ())
+      `shouldReturn` CancelledBy (show (Cancel "the caller"))
+
+holding :: Spec
+holding =
+  it "fails, once its branch has ended, when the condition stops holding" $ do
+    book <- newNotebook
+    dial <- newDial True
+    let grip = note book "grip" >> (set dial (Says False) >> hang) `onException` note book "let go"
+    end <- ending (Signal.whileHolding (watched dial) grip `onException` note book "failed")
+    end `shouldBe` (FailedWith "FailedBecause \"the condition does not hold\"" :: Ending ())
+    notes book `shouldReturn` ["grip", "let go", "failed"]

@@ -1,0 +1,116 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- 'runBehavior', with signals that this very process raises. (Where a process is to
+-- end it is a child.)
+module Behavior.RunBehaviorSpec (spec) where
+
+import Control.Concurrent
+import Control.Concurrent.Async (wait, waitCatchSTM)
+import Control.Exception
+import Data.Foldable (for_)
+import System.Exit (ExitCode (..))
+import System.IO (hFlush, stdout)
+import System.Mem (performMajorGC)
+import System.Posix.Process (ProcessStatus (..), exitImmediately, forkProcess, getProcessStatus)
+import System.Posix.Signals
+import Test.Hspec
+
+import Behavior
+import Behavior.Internal.Runtime (Event (..), Label (..), atomicallyFirmly, reportingTo)
+import Support
+
+spec :: Spec
+spec = guarded . describe "runBehavior" $ do
+  it "gives the result, the failure or the fault of the behaviour" $ do
+    runBehavior (pure 'a') `shouldReturn` 'a'
+    (runBehavior failed :: IO ()) `shouldThrow` (== Failed)
+    (runBehavior (throwIO (Fault "bug")) :: IO ()) `shouldThrow` (== Fault "bug")
+
+  it "runs it in an unbound thread, labelled, and unmasked" $ do
+    (end, events) <- observing $ \notebook -> reportingTo (note notebook) $
+      bound (mask_ (runBehavior ((,) <$> isCurrentThreadBound <*> getMaskingState)))
+    end `shouldBe` Gave (not rtsSupportsBoundThreads, Unmasked)
+    events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
+
+  for_ [(sigINT, "SIGINT", 130), (sigTERM, "SIGTERM", 143)] $ \(signal, name, code) -> do
+    it ("ends with " ++ show code ++ " after a " ++ name ++ ", when the cleanups have ended") $ do
+      notebook <- newNotebook
+      cleaning <- newGate
+      mayEnd <- newGate
+      let act = uninterruptibly (raiseSignal signal >> hang) $ do
+            open cleaning
+            pass mayEnd
+            note notebook "cleaned up"
+      launching (leavingNothing (runBehavior act)) $ \caller -> do
+        pass cleaning
+        stillRunning caller
+        open mayEnd
+        wait caller `shouldThrow` (== ExitFailure code)
+        notes notebook `shouldReturn` ["cleaned up"]
+
+    it ("ends with " ++ show code ++ " after a " ++ name ++ " also if the behaviour completes or fails all the same") $
+      for_ [pure (), failed] $ \end ->
+        runBehavior ((raiseSignal signal >> hang) `catch` \(_ :: SomeAsyncException) -> end)
+          `shouldThrow` (== ExitFailure code)
+
+    it ("does not let ? take a " ++ name ++ " for a failure") $ do
+      (_, done) <- observing $ \notebook ->
+        runBehavior ((raiseSignal signal >> hang) ? note notebook "went on")
+      done `shouldBe` []
+
+    it ("throws a fault of a cleanup after a " ++ name) $
+      runBehavior ((raiseSignal signal >> hang) `onException` throwIO (Fault "cleanup") :: IO ())
+        `shouldThrow` (== Fault "cleanup")
+
+    it ("leaves it to others what a " ++ name ++ " does, before and after") $
+      for_ [pure (), failed, throwIO (Fault "bug"), raiseSignal signal >> hang] $ \act -> do
+        heard <- newEmptyMVar
+        bracket
+          (installHandler signal (Catch (putMVar heard ())) Nothing)
+          (\old -> installHandler signal old Nothing)
+          ( \_ -> do
+              _ <- try (runBehavior act) :: IO (Either SomeException ())
+              raiseSignal signal
+              takeMVar heard
+          )
+
+    it ("ends the process at once at a second " ++ name ++ ", even during a cleanup") $
+      inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal signal >> hang)))
+        >>= (`shouldBe` Terminated signal False)
+
+    it ("makes it the exit code of the process after a " ++ name) $
+      inChild (runBehavior (raiseSignal signal >> hang))
+        >>= (`shouldBe` Exited (ExitFailure code))
+
+  it "does not return before the behaviour has ended when its caller is cancelled" $ do
+    notebook <- newNotebook
+    inside <- newGate
+    let act = (open inside >> hang) `onException` note notebook "cleaned up"
+    cancelling (leavingNothing (runBehavior act)) (pass inside)
+      `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+    notes notebook `shouldReturn` ["cleaned up"]
+
+  it "lets GHC find out that everything is deadlocked" $ do
+    found <- newGate
+    inside <- newGate
+    let deadlock = open inside >> newEmptyMVar >>= takeMVar :: IO ()
+    _ <- forkIO $ pass inside >> untilOpen found (performMajorGC >> yield)
+    launching (runBehavior deadlock) $ \caller -> do
+      end <- endingOf <$> atomicallyFirmly (waitCatchSTM caller)
+      open found
+      end `shouldBe` FaultedWith (show BlockedIndefinitelyOnMVar)
+ where
+  bound act = if rtsSupportsBoundThreads then runInBoundThread act else act
+
+-- | Runs it as the program of a child, and says how that one ended. It is killed by
+-- an alarm when it takes more than five seconds.
+inChild :: IO () -> IO ProcessStatus
+inChild program = do
+  hFlush stdout -- or the child would write it, too
+  child <- forkProcess $ do
+    _ <- scheduleAlarm 5
+    end <- try program
+    -- At once, for the child has nothing to clean up that is not its parent's.
+    exitImmediately (either id (const ExitSuccess) end)
+  getProcessStatus True False child >>= maybe (inChild program) pure

@@ -1,0 +1,282 @@
+{-# LANGUAGE CPP #-}
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- The seam, and the scope that all operators stand on.
+module Behavior.RuntimeSpec (spec) where
+
+import Control.Concurrent
+import Control.Concurrent.Async (asyncThreadId, poll)
+import Control.Concurrent.STM (newTVarIO, readTVar, retry, writeTVar)
+import Control.Exception
+import Control.Monad (replicateM, void)
+import Data.Foldable (for_, traverse_)
+import Data.Maybe (isNothing)
+#if MIN_VERSION_base(4,18,0)
+import GHC.Conc (threadLabel)
+#endif
+import Test.Hspec
+
+import Behavior (Failed (..), failed)
+import Behavior.Internal.Runtime
+import Behavior.Internal.Scope
+import Support
+
+spec :: Spec
+spec = guarded $ do
+  describe "start" starting
+  describe "interrupt" interrupting
+  describe "reportingTo" reporting
+  describe "atomically" waiting
+  describe "structured" scopes
+  describe "StoppedWithFault" pairs
+
+label :: Label
+label = Label "operator" "branch"
+
+stateOf :: [IO a -> IO a]
+stateOf = [id, mask_, uninterruptibleMask_]
+
+starting :: Spec
+starting = do
+  it "tells how the thread ended" $ do
+    thread <- mask_ (start label (pure 'a'))
+    atomically (threadEnd thread) >>= (`shouldBe` Gave 'a') . endingOf
+    faulty <- mask_ (start label (throwIO (Fault "bug") :: IO ()))
+    atomically (threadEnd faulty) >>= (`shouldBe` FaultedWith (show (Fault "bug"))) . endingOf
+
+  it "runs the action unmasked in a thread of its own, whatever the caller's state" $
+    for_ stateOf $ \inState -> do
+      caller <- myThreadId
+      thread <- inState (mask_ (start label ((,) <$> getMaskingState <*> myThreadId)))
+      Right (state, self) <- atomically (threadEnd thread)
+      state `shouldBe` Unmasked
+      self `shouldBe` threadId thread
+      self `shouldNotBe` caller
+
+  it "counts the thread among the living until it has ended, and no longer" $ do
+    before' <- living
+    gate <- newGate
+    thread <- mask_ (start label (pass gate))
+    living `shouldReturn` before' + 1
+    open gate
+    _ <- atomically (threadEnd thread)
+    living `shouldReturn` before'
+
+  it "labels the thread with its operator and branch" $ do
+    show (Label "parallel" "left") `shouldBe` "parallel: left"
+#if MIN_VERSION_base(4,18,0)
+    thread <- mask_ (start label (myThreadId >>= threadLabel))
+    Right found <- atomically (threadEnd thread)
+    found `shouldBe` Just (show label)
+#endif
+
+  it "always tells how it ended, even if it was killed as soon as it was started" $
+    for_ [1 .. 2000 :: Int] $ \_ -> do
+      thread <- mask_ (start label hang) :: IO (Thread ())
+      killThread (threadId thread)
+      end <- atomically (threadEnd thread)
+      endingOf end `shouldBe` CancelledBy (show ThreadKilled)
+
+interrupting :: Spec
+interrupting = do
+  it "returns when the thread has heard it, and cannot be interrupted while it waits for that" $ do
+    inside <- newGate
+    mayEnd <- newGate
+    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread ())
+    pass inside
+    launching (interrupt (threadId thread) (Cancel "thread")) $ \caller -> do
+      throwing (asyncThreadId caller) (Cancel "caller")
+      -- It is blocked, though not in a transaction or at an MVar.
+      poll caller >>= (`shouldBe` True) . isNothing
+      open mayEnd
+      end <- atomically (threadEnd thread)
+      endingOf end `shouldBe` CancelledBy (show (Cancel "thread"))
+      void (awaitEnd caller)
+
+  it "by a messenger does not wait" $ do
+    inside <- newGate
+    mayEnd <- newGate
+    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread ())
+    pass inside
+    interruptByMessenger (threadId thread) (Cancel "thread")
+    open mayEnd
+    end <- atomically (threadEnd thread)
+    endingOf end `shouldBe` CancelledBy (show (Cancel "thread"))
+
+  it "does nothing to a thread that has ended" $ do
+    thread <- mask_ (start label (pure 'a'))
+    awaitOver (threadId thread)
+    interrupt (threadId thread) (Cancel "thread")
+    interruptByMessenger (threadId thread) (Cancel "thread")
+    end <- atomically (threadEnd thread)
+    endingOf end `shouldBe` Gave 'a'
+
+reporting :: Spec
+reporting = do
+  it "reports the start and the end of each thread, in the thread itself, masked" $ do
+    notebook <- newNotebook
+    let sink event = (,,) event <$> myThreadId <*> getMaskingState >>= note notebook
+    thread <- reportingTo sink $ do
+      thread <- mask_ (start label (pure ()))
+      thread <$ atomically (threadEnd thread)
+    events <- notes notebook
+    [(event, who) | (event, who, _) <- events]
+      `shouldBe` [(Started label, threadId thread), (Ended label, threadId thread)]
+    [state | (_, _, state) <- events] `shouldSatisfy` notElem Unmasked
+
+  it "reports the end of a thread that throws" $ do
+    (_, events) <- observing $ \notebook -> reportingTo (note notebook) $ do
+      thread <- mask_ (start label (failed :: IO ()))
+      atomically (threadEnd thread)
+    events `shouldBe` [Started label, Ended label]
+
+  it "reports nothing after the action has ended, in whatever way" $ do
+    (end, events) <- observing $ \notebook -> do
+      reportingTo (note notebook) (pure ())
+      _ <- ending (reportingTo (note notebook) failed)
+      thread <- mask_ (start label (pure ()))
+      void (atomically (threadEnd thread))
+    end `shouldBe` Gave ()
+    events `shouldBe` []
+
+waiting :: Spec
+waiting = do
+  it "can be interrupted, also where exceptions are masked" $
+    for_ [id, mask_] $ \inState -> do
+      launching (inState (atomically retry)) $ \caller -> do
+        awaitIdle (asyncThreadId caller)
+        throwTo (asyncThreadId caller) (Cancel "caller")
+        awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "caller")) :: Ending ())
+
+  it "firmly cannot" $ do
+    var <- newTVarIO False
+    launching (atomicallyFirmly (readTVar var >>= \there -> if there then pure 'a' else retry)) $ \caller -> do
+      awaitIdle (asyncThreadId caller)
+      throwing (asyncThreadId caller) (Cancel "caller")
+      stillRunning caller
+      atomically (writeTVar var True)
+      awaitOver (asyncThreadId caller)
+
+  it "has a checkpoint where a cancellation arrives that was masked until then" $ do
+    ready <- newGate
+    mayGo <- newGate
+    (end, done) <- observing $ \notebook -> do
+      let act = mask $ \restore -> do
+            uninterruptibleMask_ (open ready >> pass mayGo)
+            note notebook "masked"
+            restore checkpoint
+            note notebook "went on"
+      launching act $ \caller -> do
+        pass ready
+        throwing (asyncThreadId caller) (Cancel "caller")
+        open mayGo
+        awaitEnd caller
+    (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), ["masked"])
+
+scopes :: Spec
+scopes = do
+  it "gives the verdict when nothing was started" $ do
+    structured (\_ -> pure (pure 'a')) `shouldReturn` 'a'
+    structured (\_ -> pure (failed :: IO ())) `shouldThrow` (== Failed)
+    structured (\_ -> failed :: IO (IO ())) `shouldThrow` (== Failed)
+
+  it "comes to the verdict when all has ended" $
+    for_ [pure (), failed] $ \bodysEnd -> do
+      (_, done) <- observing $ \notebook -> structured $ \scope -> do
+        inside <- newGate
+        _ <- branch scope label ((open inside >> hang) `onException` note notebook "cleaned up") :: IO (Branch ())
+        pass inside
+        pure (note notebook "verdict" >> bodysEnd)
+      done `shouldBe` ["cleaned up", "verdict"]
+
+  it "stops what was started when the body throws" $ do
+    (end, done) <- observing $ \notebook -> structured $ \scope -> do
+      inside <- newGate
+      _ <- branch scope label ((open inside >> hang) `onException` note notebook "cleaned up") :: IO (Branch ())
+      pass inside
+      throwIO (Fault "body") :: IO (IO ())
+    (end, done) `shouldBe` (FaultedWith (show (Fault "body")), ["cleaned up"])
+
+  it "tells a worker whether it was asked to stop" $ do
+    (_, told) <- observing $ \notebook -> structured $ \scope -> do
+      inside <- newGate
+      mayEnd <- newGate
+      started <- worker scope label $ \asked -> do
+        asked >>= note notebook
+        (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> asked >>= note notebook
+        pass mayEnd
+      pass inside
+      ask [SomeBranch started]
+      open mayEnd
+      pure . pure =<< atomically (outcome started)
+    told `shouldBe` [False, True]
+
+  it "asks nobody twice, however it is asked" $ do
+    (_, done) <- observing $ \notebook -> structured $ \scope -> do
+      inside <- newGate
+      cleaning <- newGate
+      mayEnd <- newGate
+      started <- branch scope label $
+        (open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note notebook "cleaned up") :: IO (Branch ())
+      pass inside
+      ask [SomeBranch started]
+      ask [SomeBranch started]
+      askWithoutWaiting [SomeBranch started]
+      pass cleaning
+      open mayEnd
+      pure (pure ())
+    done `shouldBe` ["cleaned up"]
+
+  it "asks without waiting those who cannot be interrupted just now" $ do
+    (end, done) <- observing $ \notebook -> structured $ \scope -> do
+      insides <- replicateM 3 newGate
+      mayEnd <- newGate
+      started <- traverse (\inside -> branch scope label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) insides
+      traverse_ pass insides
+      askWithoutWaiting (map SomeBranch (started :: [Branch ()]))
+      note notebook "asked"
+      open mayEnd
+      pure (pure ())
+    (end, done) `shouldBe` (Gave (), ["asked"])
+
+  it "says how each branch ended, and tells a result from anything else" $
+    structured $ \scope -> do
+      well <- branch scope label (pure 'a')
+      badly <- branch scope label (failed :: IO Char)
+      atomically (completed well) >>= (`shouldBe` 'a')
+      atomically (uncompleted badly) >>= (`shouldBe` FailedWith (show Failed)) . (endingOf :: Either SomeException () -> Ending ()) . Left
+      (settle =<< atomically (outcome well)) `shouldReturn` 'a'
+      (settle =<< atomically (outcome badly)) `shouldThrow` (== Failed)
+      pure (pure ())
+
+  it "does not let a cancellation that comes while branches stop strike the caller's handlers" $ do
+    inside <- newGate
+    cleaning <- newGate
+    mayEnd <- newGate
+    (end, done) <- observing $ \notebook -> do
+      let operator = structured $ \scope -> do
+            _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
+            pass inside
+            pure (failed :: IO ())
+          -- The handler of a failure would be run, and interrupted.
+          handled = operator `catch` \Failed -> note notebook "handler"
+      launching handled $ \caller -> do
+        pass cleaning
+        throwing (asyncThreadId caller) (Cancel "caller")
+        open mayEnd
+        awaitEnd caller
+    (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), [])
+
+pairs :: Spec
+pairs = do
+  it "is a cancellation, and no handler for the fault's type catches it" $ do
+    let pair = StoppedWithFault (toException (Cancel "user")) (toException (Fault "bug"))
+    (throwIO pair `catch` \(_ :: SomeAsyncException) -> pure "cancelled") `shouldReturn` "cancelled"
+    ending (throwIO pair `catch` \(_ :: Fault) -> pure ())
+      `shouldReturn` CancelledWithFault (show (Cancel "user")) (show (Fault "bug"))
+
+  it "says what it holds" $ do
+    let pair = StoppedWithFault (toException (Cancel "user")) (toException (Fault "bug"))
+    show (Just pair) `shouldBe` "Just (StoppedWithFault Cancel \"user\" Fault \"bug\")"
+    displayException pair `shouldBe` "stopped by Cancel \"user\", and while stopping: Fault \"bug\""

@@ -1,0 +1,239 @@
+{-# LANGUAGE LambdaCase #-}
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- Storms: thousands of cancellations, at random moments, of random behaviours.
+--
+-- The moment is a random number of 'yield's after the start. A storm proves nothing
+-- about a schedule that it does not hit; but whichever it hits, what is checked here
+-- must hold, so no example can fail by bad luck.
+module Behavior.StormSpec (spec) where
+
+import Control.Concurrent
+import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar)
+import Control.Exception
+import Control.Monad (replicateM_, void)
+import Data.Foldable (for_)
+import Data.IORef
+import Test.Hspec hiding (parallel)
+import Test.QuickCheck hiding (Failure, within)
+
+import Behavior
+import Behavior.Parallel (allOf, firstOf, fork, scoped)
+import qualified Behavior.Signal as Signal
+import Behavior.Time (atomically, timeout)
+import Places
+import Support
+
+spec :: Spec
+spec = guarded . describe "Thousands of cancellations at random moments" $ do
+  it "leave nothing running, through every operator nested in every other" $
+    property . withMaxSuccess 3000 $ \(Nest nest) leaf (Moments moments) ->
+      ioProperty $ do
+        inside <- newIORef (0 :: Int)
+        let act = foldr placed (perform inside leaf) nest
+        end <- storming moments (leavingNothing act)
+        left <- readIORef inside
+        pure $
+          tabulate "it ended" [kindOf end] $
+            counterexample (show end) (left === 0 .&&. end `among` leaf)
+
+  it "leave nothing running in a tree of operators whose conditions change all the time" $
+    property . withMaxSuccess 2000 $ \tree (Moments moments) ->
+      ioProperty $ do
+        inside <- newIORef (0 :: Int)
+        weather <- newTVarIO (0 :: Int)
+        let change = atomically (modifyTVar' weather (+ 1))
+        end <- stormingWith change moments (leavingNothing (grow inside weather tree))
+        left <- readIORef inside
+        pure (tabulate "it ended" [kindOf end] (left === 0))
+
+  it "stop an operator that was only just started" $
+    for_ threaded $ \place ->
+      replicateM_ 50 $ do
+        end <- cancelling (leavingNothing (placed place hang)) (pure ())
+        end `shouldBe` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+
+  it "are never taken for the failure of a moment before or after" $
+    for_ [1 .. 2000 :: Int] $ \n -> do
+      let failing = replicateM_ (n `mod` 7) yield >> failed
+          act = case n `mod` 4 of
+            0 -> attempt maxBound failing
+            1 -> fallbackOver [1 :: Int ..] (const failing)
+            2 -> attempt maxBound (parallel failing hang)
+            _ -> attempt maxBound (both hang failing)
+      end <- storming [n `mod` 31] (leavingNothing act)
+      end `shouldBe` CancelledBy (show (Cancel "the storm"))
+
+  it "lose no fault that a branch has thrown" $
+    property . withMaxSuccess 2000 $
+      forAll (elements threaded) $ \place (NonNegative n) (Moments moments) ->
+        ioProperty $ do
+          thrown <- newIORef False
+          let act = do
+                replicateM_ n yield
+                -- Nothing comes between the note and the fault.
+                mask_ (writeIORef thrown True >> throwIO (Fault "branch"))
+          end <- storming moments (placed place act)
+          wasThrown <- readIORef thrown
+          pure . cover 10 wasThrown "the branch came to its fault" . counterexample (show end) $
+            case end of
+              FaultedWith fault -> fault === show (Fault "branch")
+              CancelledWithFault _ fault -> fault === show (Fault "branch")
+              _ -> wasThrown === False
+
+  it "do not come between a failure and the alternative, and both get what they should" $
+    property . withMaxSuccess 1000 $ \(NonNegative n) (Moments moments) ->
+      ioProperty $ do
+        (end, done) <- do
+          notebook <- newNotebook
+          let first = replicateM_ n yield >> note notebook 'f' >> failed
+          e <- storming moments (first ? note notebook 's')
+          (,) e <$> notes notebook
+        pure . counterexample (show (end, done)) $
+          case end of
+            Gave () -> done === "fs"
+            CancelledBy _ -> property (done `elem` ["", "f", "fs"])
+            _ -> property False
+
+-- | Cancels the caller after so many 'yield's, and again after so many more, and so
+-- on; then says how it ended.
+storming :: [Int] -> IO a -> IO (Ending a)
+storming = stormingWith (pure ())
+
+stormingWith :: IO () -> [Int] -> IO a -> IO (Ending a)
+stormingWith meanwhile moments act =
+  launching act $ \caller -> do
+    for_ moments $ \moment -> do
+      replicateM_ moment (meanwhile >> yield)
+      throwing (asyncThreadId caller) (Cancel "the storm")
+    awaitEnd caller
+
+-- | How often to yield before each of one to three cancellations.
+newtype Moments = Moments [Int]
+  deriving (Show)
+
+instance Arbitrary Moments where
+  arbitrary = Moments <$> (choose (1, 3) >>= \n -> vectorOf n (frequency [(3, choose (0, 10)), (1, choose (0, 100))]))
+  shrink (Moments moments) = [Moments fewer | fewer@(_ : _) <- shrink moments, all (>= 0) fewer]
+
+newtype Nest = Nest [Place]
+  deriving (Show)
+
+instance Arbitrary Nest where
+  arbitrary = Nest <$> (choose (1, 4) >>= \n -> vectorOf n (elements places))
+  shrink (Nest nest) = [Nest fewer | fewer@(_ : _) <- shrinkList (const []) nest]
+
+-- | What is done at the bottom: so many 'yield's, then one of these.
+data Leaf = Leaf Int Bottom Cleanup
+  deriving (Show)
+
+data Bottom = Hangs | Returns | FailsThen | FaultsThen
+  deriving (Bounded, Enum, Eq, Show)
+
+data Cleanup = Quick | Slow | Faulty
+  deriving (Bounded, Enum, Eq, Show)
+
+instance Arbitrary Leaf where
+  arbitrary = Leaf <$> choose (0, 30) <*> arbitraryBoundedEnum <*> arbitraryBoundedEnum
+
+-- | Counts in and out, however it ends; the way out cannot be interrupted.
+perform :: IORef Int -> Leaf -> IO ()
+perform inside (Leaf n bottom cleanup) =
+  bracket_ (count 1) (uninterruptibleMask_ goingOut) $ do
+    replicateM_ n yield
+    case bottom of
+      Hangs -> hang
+      Returns -> pure ()
+      FailsThen -> throwIO theFailure
+      FaultsThen -> throwIO (Fault "bottom")
+ where
+  count d = atomicModifyIORef' inside (\k -> (k + d, ()))
+  goingOut = do
+    case cleanup of
+      Quick -> pure ()
+      _ -> replicateM_ 20 yield
+    count (-1)
+    case cleanup of
+      Faulty -> throwIO (Fault "cleanup")
+      _ -> pure ()
+
+-- | How something can end that has the leaf at its bottom: as the leaf does, or
+-- cancelled. (A cleanup that faults while the leaf runs in the caller's thread takes
+-- the cancellation's place, as everywhere in GHC.)
+among :: Ending () -> Leaf -> Bool
+among end (Leaf _ bottom cleanup) = case end of
+  CancelledBy e -> e == storm
+  CancelledWithFault e fault -> e == storm && fault `elem` faults
+  FaultedWith fault -> fault `elem` faults
+  Gave () -> bottom == Returns && cleanup /= Faulty
+  FailedWith e -> bottom == FailsThen && cleanup /= Faulty && e == show theFailure
+ where
+  storm = show (Cancel "the storm")
+  faults =
+    [show (Fault "bottom") | bottom == FaultsThen] ++ [show (Fault "cleanup") | cleanup == Faulty]
+
+kindOf :: Ending a -> String
+kindOf = \case
+  Gave _ -> "well"
+  FailedWith _ -> "in failure"
+  FaultedWith _ -> "in a fault"
+  CancelledBy _ -> "cancelled"
+  CancelledWithFault _ _ -> "cancelled, with a fault"
+
+data Tree
+  = Bottom Leaf
+  | Orelse Tree Tree
+  | Times Int Tree
+  | Race Tree Tree
+  | Gather Tree Tree
+  | Races [Tree]
+  | Gathers [Tree]
+  | Forking Tree [Tree]
+  | Within Double Tree
+  | Select Tree Tree
+  | Guard Tree Tree
+  | Switching Tree Tree
+  deriving (Show)
+
+instance Arbitrary Tree where
+  arbitrary = sized (tree . min 12)
+   where
+    tree n
+      | n <= 1 = Bottom <$> arbitrary
+      | otherwise =
+          oneof
+            [ Orelse <$> half <*> half
+            , Times <$> choose (1, 3) <*> tree (n - 1)
+            , Race <$> half <*> half
+            , Gather <$> half <*> half
+            , Races <$> several
+            , Gathers <$> several
+            , Forking <$> half <*> several
+            , Within <$> elements [0, 0.0001, 3600] <*> tree (n - 1)
+            , Select <$> half <*> half
+            , Guard <$> half <*> half
+            , Switching <$> half <*> half
+            ]
+     where
+      half = tree (n `div` 2)
+      several = choose (1, 3) >>= \k -> vectorOf k (tree (n `div` 3))
+
+grow :: IORef Int -> TVar Int -> Tree -> IO ()
+grow inside weather = go
+ where
+  go = \case
+    Bottom leaf -> perform inside leaf
+    Orelse a b -> go a ? go b
+    Times n a -> attempt n (go a)
+    Race a b -> go a ||| go b
+    Gather a b -> both (go a) (go b)
+    Races as -> firstOf (map go as)
+    Gathers as -> void (allOf (map go as))
+    Forking a as -> scoped (\nursery -> for_ as (fork nursery . go) >> go a)
+    Within s a -> timeout (realToFrac s) (go a)
+    Select a b -> Signal.rSelect ((== 0) . (`mod` 2) <$> sky) (go a) (go b)
+    Guard a b -> Signal.monitor ((== 0) . (`mod` 3) <$> sky) (go a) (go b)
+    Switching a b -> Signal.switch sky (\n -> if even n then go a else go b)
+  sky = Signal.watching (readTVar weather)

@@ -1,0 +1,161 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+module Behavior.TimeSpec (spec) where
+
+import Control.Concurrent (myThreadId)
+import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+import Control.Exception
+import Control.Monad (replicateM)
+import Data.Foldable (for_)
+import Data.List (sort)
+import qualified System.Timeout as System
+import Test.Hspec
+import Test.QuickCheck hiding (Failure, within)
+
+import Behavior
+import Behavior.Internal.Runtime (duration, period, sleepUntil)
+import Behavior.Time
+import Support
+
+-- | Real time passes in here, but never more of it than a few milliseconds, and no
+-- example depends on how fast the machine is.
+spec :: Spec
+spec = guarded $ do
+  describe "Seconds" lengths
+  describe "now" $
+    it "never goes backwards" $ do
+      moments <- replicateM 1000 now
+      moments `shouldBe` sort moments
+  describe "sleep" sleeping
+  describe "timeout" timeouts
+
+infinite, notANumber :: Seconds
+infinite = 1 / 0
+notANumber = 0 / 0
+
+lengths :: Spec
+lengths = do
+  it "are written, and shown, as decimal numbers" $ do
+    show (0.05 :: Seconds) `shouldBe` "0.05"
+    show (3600 :: Seconds) `shouldBe` "3600.0"
+    show (Just (-0.5 :: Seconds)) `shouldBe` "Just (-0.5)"
+
+  it "can be read as they are shown" $
+    property $ \(x :: Double) -> let s = realToFrac x :: Seconds in read (show s) === s
+
+  it "can be calculated with" $
+    property $ \(x :: Double) (y :: Double) ->
+      realToFrac (realToFrac x + realToFrac y * 2 :: Seconds) === x + y * 2
+
+  it "must not be negative or NaN" $
+    for_ [-1, -0.001, notANumber, -infinite] $ \s -> do
+      sleep s `shouldThrow` isRefusal "sleep: a duration is zero or more seconds, not " s
+      timeout s (pure ()) `shouldThrow` isRefusal "timeout: a duration is zero or more seconds, not " s
+      duration "x" s `shouldThrow` isRefusal "x: a duration is zero or more seconds, not " s
+
+  it "must be more than zero where a period is asked for" $ do
+    for_ [0, -1, notANumber] $ \s ->
+      period "x" s `shouldThrow` isRefusal "x: a period is more than zero seconds, not " s
+    period "x" 0.001 `shouldReturn` 0.001
+ where
+  isRefusal text s (ErrorCall message) = message == text ++ show s
+
+sleeping :: Spec
+sleeping = do
+  it "returns at once for zero seconds, even under uninterruptibleMask" $
+    uninterruptibleMask_ (sleep 0)
+
+  it "takes at least as long as it was told to" $
+    for_ [0.0001, 0.001, 0.003] $ \s -> do
+      start <- now
+      sleep s
+      end <- now
+      end - start `shouldSatisfy` (>= s)
+
+  it "goes on until the moment has come, and not at all when it has gone" $ do
+    moment <- (+ 0.002) <$> now
+    sleepUntil moment
+    now >>= (`shouldSatisfy` (>= moment))
+    sleepUntil (moment - 1000)
+
+  it "can be interrupted, however long it would take" $
+    for_ [3600, 1.0e30, infinite] $ \s -> do
+      launching (sleep s) $ \sleeper -> do
+        awaitIdle (asyncThreadId sleeper)
+        throwTo (asyncThreadId sleeper) (Cancel "the sleeper")
+        awaitEnd sleeper `shouldReturn` CancelledBy (show (Cancel "the sleeper"))
+
+timeouts :: Spec
+timeouts = do
+  it "changes nothing for a behaviour that is in time" $
+    property $ \a ->
+      sameAs (\notebook -> timeout 3600 (play notebook a)) (`play` a)
+        .&&. sameAs (\notebook -> timeout infinite (play notebook a)) (`play` a)
+
+  it "fails with TimedOut, which can be caught by ?, when the behaviour takes longer" $ do
+    timeout 0.001 hang `shouldThrow` (== TimedOut 0.001)
+    (timeout 0.001 hang ? pure 'b') `shouldReturn` 'b'
+    displayException (TimedOut 0.5) `shouldBe` "timed out after 0.5 s"
+
+  it "does not start the behaviour when there is no time at all" $
+    observing (\notebook -> timeout 0 (note notebook 'a'))
+      `shouldReturn` (FailedWith (show (TimedOut 0)), "")
+
+  it "returns when the behaviour has ended, however slow its cleanup" $ do
+    notebook <- newNotebook
+    cleaning <- newGate
+    mayEnd <- newGate
+    let act = uninterruptibly hang (open cleaning >> pass mayEnd >> note notebook "cleaned up")
+    launching (leavingNothing (timeout 0.001 act)) $ \caller -> do
+      pass cleaning
+      stillRunning caller
+      open mayEnd
+      awaitEnd caller `shouldReturn` (FailedWith (show (TimedOut 0.001)) :: Ending ())
+      notes notebook `shouldReturn` ["cleaned up"]
+
+  it "keeps a result that the behaviour returns although it was asked to stop" $
+    timeout 0.001 (hang `catch` \(_ :: SomeAsyncException) -> pure 'a') `shouldReturn` 'a'
+
+  it "throws a failure or a fault of the cleanup instead of its own failure" $ do
+    timeout 0.001 (hang `onException` failWith "cleanup" :: IO ())
+      `shouldThrow` (== FailedBecause "cleanup")
+    timeout 0.001 (hang `onException` throwIO (Fault "cleanup") :: IO ())
+      `shouldThrow` (== Fault "cleanup")
+
+  it "does not ask again, when it is cancelled, a behaviour that it asked when time was up" $ do
+    notebook <- newNotebook
+    cleaning <- newGate
+    mayEnd <- newGate
+    let act = hang `onException` (open cleaning >> pass mayEnd >> note notebook "cleaned up")
+    launching (timeout 0.001 act) $ \caller -> do
+      pass cleaning
+      awaitIdle (asyncThreadId caller)
+      throwTo (asyncThreadId caller) (Cancel "the caller")
+      stillRunning caller
+      open mayEnd
+      awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+      notes notebook `shouldReturn` ["cleaned up"]
+
+  it "is told apart from the timeouts around and within it" $ do
+    timeout 3600 (timeout 0.001 hang) `shouldThrow` (== TimedOut 0.001)
+    timeout 0.001 (timeout 3600 hang) `shouldThrow` (== TimedOut 0.001)
+    timeout 3600 (timeout 0.001 hang ? pure 'b') `shouldReturn` 'b'
+    -- The outer one's time is up: the inner one's alternative does not run.
+    timeout 0.001 (timeout 3600 hang ? pure 'b') `shouldThrow` (== TimedOut 0.001)
+    System.timeout 1000 (timeout 3600 hang ? pure 'b') `shouldReturn` Nothing
+    timeout 0.001 (System.timeout 3600000000 hang) `shouldThrow` (== TimedOut 0.001)
+
+  it "counts from when it is run, each time" $ do
+    let limited = timeout 0.001
+    limited hang `shouldThrow` (== TimedOut 0.001)
+    limited (pure 'a') `shouldReturn` 'a'
+
+  it "sees what is written in the transactions that it waits for" $ do
+    var <- newTVarIO 'a'
+    timeout 3600 (atomically (writeTVar var 'b'))
+    atomically (readTVar var) `shouldReturn` 'b'
+
+  it "runs the behaviour in a thread of its own" $ do
+    caller <- myThreadId
+    timeout 3600 myThreadId >>= (`shouldNotBe` caller)

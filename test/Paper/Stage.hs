@@ -1,0 +1,125 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Where the specs play the listings: a fresh world for each, a script that says what
+-- happens while an action lasts, and the robot's steps.
+module Paper.Stage
+  ( -- * Playing a listing
+    playing
+  , playingIn
+  , Step (..)
+  , failedBecause
+
+    -- * The script
+  , Scene (..)
+  , untilInterrupted
+  , failing
+  , unwatched
+
+    -- * What happens to the world
+  , becomes
+  , doorBecomes
+  , batteryDropsTo
+  , withoutSensors
+  ) where
+
+import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, writeTVar)
+import Control.Exception (displayException, throw)
+import Control.Monad (join, when)
+import Data.List (stripPrefix)
+import Data.Maybe (fromMaybe)
+import Test.Hspec (shouldBe)
+
+import Behavior (Behavior, Failed (..), failWith)
+import Behavior.Internal.Runtime (living)
+import Behavior.Time (atomically)
+import Event (Event (action, happening), Happening)
+import qualified Event
+import Robot (inWorld)
+import Support (Ending (..), ending, hang)
+import World
+
+-- | @playing setting script listing@: how the listing ended, and what the robot did.
+-- Every scene of the script must have been played.
+playing :: Setting -> [Scene] -> Behavior a -> IO (Ending a, [Step])
+playing stage script listing = playingIn stage script (const listing)
+
+-- | 'playing' where something happens to the world before.
+playingIn :: Setting -> [Scene] -> (World -> Behavior a) -> IO (Ending a, [Step])
+playingIn stage script listing = do
+  scenes <- newTVarIO script
+  let named name (During n _) = n == name
+      act world name = join . atomically $ do
+        (before, from) <- break (named name) <$> readTVar scenes
+        case from of
+          During _ scene : after -> scene world <$ writeTVar scenes (before ++ after)
+          [] -> pure (pure ())
+  world <- newWorld stage {lasting = act}
+  end <- ending (inWorld world (listing world))
+  unplayed <- readTVarIO scenes
+  [name | During name _ <- unplayed] `shouldBe` []
+  events <- happened world
+  pure (end, steps events)
+
+-- | What the robot did. It does one thing at a time: an action ends, and only then
+-- another begins.
+data Step
+  = Did String
+  | FailedTo String String
+  | InterruptedIn String
+  | FaultedIn String String
+  | OutOfTurn String Happening
+  deriving (Eq, Show)
+
+steps :: [Event] -> [Step]
+steps = \case
+  begun : ended : others
+    | happening begun == Event.Begins
+    , action begun == action ended
+    , Just step <- endOf (action ended) (happening ended) ->
+        step : steps others
+  event : others -> OutOfTurn (action event) (happening event) : steps others
+  [] -> []
+ where
+  endOf name = \case
+    Event.Begins -> Nothing
+    Event.Done -> Just (Did name)
+    Event.Fails why -> Just (FailedTo name (fromMaybe why (stripPrefix (announcing "") why)))
+    Event.Interrupted -> Just (InterruptedIn name)
+    Event.Faults what -> Just (FaultedIn name what)
+  announcing = displayException . FailedBecause
+
+-- | How a listing ends that fails for this reason.
+failedBecause :: String -> Ending a
+failedBecause = FailedWith . show . FailedBecause
+
+-- | What happens while the action of this name lasts: the first such scene the first
+-- time, and so on. An action for which there is no scene is done at once.
+data Scene = During String (World -> Behavior ())
+
+-- | The action goes on after the scene, until it is interrupted.
+untilInterrupted :: (World -> Behavior ()) -> World -> Behavior ()
+untilInterrupted scene world = scene world >> hang
+
+failing :: String -> World -> Behavior ()
+failing why _ = failWith why
+
+-- | Fails when a thread of the library is there, to watch something or to run the
+-- action in.
+unwatched :: World -> Behavior ()
+unwatched _ = living >>= \n -> when (n > 0) (failWith "somebody is watching")
+
+becomes :: Condition -> Bool -> World -> Behavior ()
+becomes condition value world = atomically (writeTVar (holds world condition) value)
+
+doorBecomes :: Door -> DoorState -> World -> Behavior ()
+doorBecomes door state world = atomically (writeTVar (doorIs world door) state)
+
+batteryDropsTo :: Double -> World -> Behavior ()
+batteryDropsTo percent world = setBattery world percent
+
+-- | While the behaviour runs, no condition of the world can be sensed: that fails.
+withoutSensors :: Behavior a -> World -> Behavior a
+withoutSensors behavior world = inWorld blind behavior
+ where
+  blind = world {holds = \_ -> throw (FailedBecause "the sensor is broken")}

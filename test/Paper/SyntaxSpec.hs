@@ -1,0 +1,137 @@
+{-# LANGUAGE RebindableSyntax #-}
+
+-- |
+-- "Behavior.Paper" itself: what it overloads means what it stands for, on ordinary
+-- values too.
+module Paper.SyntaxSpec (spec) where
+
+import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVarIO, writeTVar)
+import Test.Hspec
+
+import Behavior.Paper
+import Behavior.Time (atomically)
+import Support (Ending (..), Fault (..), ending, guarded, hang)
+
+spec :: Spec
+spec = guarded $ do
+  describe "if" $ do
+    it "chooses by a Bool, between anything" $
+      [if True then 'y' else 'n', if False then 'y' else 'n'] `shouldBe` "yn"
+    it "chooses by a behaviour, between behaviours" $ do
+      (if return True then return 'y' else return 'n') `shouldReturn` 'y'
+      (if return False then return 'y' else return 'n') `shouldReturn` 'n'
+    it "runs its condition once, before" $
+      noting (\note -> if note "test" >> return True then note "yes" else note "no")
+        `shouldReturn` (Gave (), ["test", "yes"])
+    it "runs nothing else when its condition fails or faults" $ do
+      noting (\note -> if blind then note "yes" else note "no") `shouldReturn` (blindness, [])
+      noting (\note -> if broken then note "yes" else note "no") `shouldReturn` (breakage, [])
+  describe "unless" $ do
+    it "runs the behaviour when the Bool is false" $
+      noting (\note -> unless False (note "a") >> unless True (note "b"))
+        `shouldReturn` (Gave (), ["a"])
+    it "runs the behaviour when the condition is false" $
+      noting (\note -> unless (return False) (note "a") >> unless (return True) (note "b"))
+        `shouldReturn` (Gave (), ["a"])
+    it "runs nothing when the condition fails or faults" $ do
+      noting (\note -> unless blind (note "a")) `shouldReturn` (blindness, [])
+      noting (\note -> unless broken (note "a")) `shouldReturn` (breakage, [])
+  describe "not" $ do
+    it "is the Prelude's on a Bool" $
+      map not [False, True] `shouldBe` [True, False]
+    it "is the opposite of a condition" $ do
+      not (return False) `shouldReturn` True
+      not (return True) `shouldReturn` False
+    it "of a condition that fails or faults does the same" $ do
+      ending (not blind) `shouldReturn` blindness
+      ending (not broken) `shouldReturn` breakage
+  describe "&" $ do
+    it "is && on Bool" $
+      [l & r | l <- [False, True], r <- [False, True]] `shouldBe` [False, False, False, True]
+    it "is whether both conditions are true" $
+      mapM (\(l, r) -> return l & return r) [(False, False), (False, True), (True, False), (True, True)]
+        `shouldReturn` [False, False, False, True]
+    it "tests the second only if the first is true" $ do
+      (return False & broken) `shouldReturn` False
+      ending (return True & broken) `shouldReturn` breakage
+      ending (blind & broken) `shouldReturn` blindness
+    it "binds looser than > and ==" $
+      (1 == one & two > 1) `shouldBe` True
+  describe ">" $ do
+    it "compares values of one type" $ do
+      (two > 1, one > 1) `shouldBe` (True, False)
+      ("b" > "a", (1.5 :: Double) > 2) `shouldBe` (True, False)
+    it "makes a condition of a behaviour and a value" $ do
+      ((return two :: Behavior Int) > 1) `shouldReturn` True
+      ((return one :: Behavior Int) > 1) `shouldReturn` False
+    it "can be a section" $
+      filter (> one) [one, two] `shouldBe` [two]
+    it "of a behaviour that fails or faults does the same" $ do
+      ending ((failed :: Behavior Int) > 1) `shouldReturn` FailedWith (show Failed)
+      ending ((throwing :: Behavior Int) > 1) `shouldReturn` breakage
+  describe "fallback" $ do
+    it "is that of two behaviours" $ do
+      fallback (return 'a' :: Behavior Char) (return 'b') `shouldReturn` 'a'
+      fallback (failed :: Behavior Char) (return 'b') `shouldReturn` 'b'
+      ending (fallback (throwing :: Behavior Char) (return 'b')) `shouldReturn` breakage
+    it "is that over a list" $ do
+      fallback [1, 2, 3 :: Int] (\n -> if n > 1 then return n else failed) `shouldReturn` 2
+      ending (fallback "ab" (\door -> failWith [door] :: Behavior ()))
+        `shouldReturn` FailedWith (show (FailedBecause "b"))
+      ending (fallback "" return) `shouldReturn` FailedWith (show Failed)
+      ending (fallback "ab" (\_ -> throwing :: Behavior ())) `shouldReturn` breakage
+  describe "attempt" $ do
+    it "tries a behaviour" $
+      noting (\note -> attempt 3 (note "try" >> failed)) `shouldReturn` (gaveUp, ["try", "try", "try"])
+    it "tries a behaviour that takes arguments, with the same arguments" $
+      noting (\note -> attempt 2 (\x y -> note (x ++ y) >> failed) "a" "b")
+        `shouldReturn` (gaveUp, ["ab", "ab"])
+    it "tries nothing with none or fewer" $ do
+      noting (\note -> attempt 0 note "try") `shouldReturn` (gaveUp, [])
+      noting (\note -> attempt (-1) (note "try")) `shouldReturn` (gaveUp, [])
+    it "is attemptNTimes" $
+      noting (\note -> attemptNTimes 2 (\x -> note x >> failed) "try")
+        `shouldReturn` (gaveUp, ["try", "try"])
+  describe "rSelect" $ do
+    it "can be given a Bool" $ do
+      rSelect True (return 'l') (return 'r') `shouldReturn` 'l'
+      rSelect False (return 'l') (return 'r') `shouldReturn` 'r'
+    it "switches when its condition changes" $ do
+      state <- newTVarIO False
+      rSelect (not (readTVarIO state)) (write state True >> hang) (return 'r') `shouldReturn` 'r'
+    it "fails or faults when its condition does" $ do
+      noting (\note -> rSelect blind (note "l") (note "r")) `shouldReturn` (blindness, [])
+      noting (\note -> rSelect broken (note "l") (note "r")) `shouldReturn` (breakage, [])
+  describe "monitor" $ do
+    it "can be given a Bool" $
+      monitor False (return ()) (return 't') `shouldReturn` 't'
+    it "recovers when its condition becomes true" $ do
+      level <- newTVarIO two
+      monitor (fmap negate (readTVarIO level) > (-2)) (write level 3)
+        (readTVarIO level >>= \n -> if n > 2 then return n else write level 0 >> hang)
+        `shouldReturn` 3
+    it "fails or faults when its condition does" $ do
+      noting (\note -> monitor blind (note "r") (note "t")) `shouldReturn` (blindness, [])
+      noting (\note -> monitor broken (note "r") (note "t")) `shouldReturn` (breakage, [])
+ where
+  one = 1 :: Int
+  two = 2 :: Int
+  blind = failWith "blind" :: Behavior Bool
+  blindness = FailedWith (show (FailedBecause "blind"))
+  broken = throwing :: Behavior Bool
+  breakage = FaultedWith (show (Fault "broken"))
+  gaveUp = FailedWith (show Failed) :: Ending ()
+
+throwing :: Behavior a
+throwing = throw (Fault "broken")
+
+write :: TVar a -> a -> Behavior ()
+write variable = atomically . writeTVar variable
+
+-- | How a behaviour ends that is given something to note with, and what it has noted.
+noting :: ((String -> Behavior ()) -> Behavior a) -> IO (Ending a, [String])
+noting behavior = do
+  notebook <- newTVarIO []
+  end <- ending (behavior (\what -> atomically (modifyTVar' notebook (what :))))
+  notes <- readTVarIO notebook
+  return (end, reverse notes)

@@ -1,0 +1,87 @@
+-- |
+-- All the places where an operator runs a behaviour: what is promised of every
+-- operator is tried in each of them.
+module Places
+  ( Place (..)
+  , places
+  , threaded
+  , inCaller
+  , theFailure
+  ) where
+
+import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+import Control.Exception (SomeException, throwIO)
+import Control.Monad (void)
+
+import Behavior
+import Behavior.Internal.Runtime (Label (..))
+import Behavior.Parallel (allOf, firstOf, fork, scoped)
+import qualified Behavior.Signal as Signal
+import Behavior.Time (atomically, timeout)
+import Support
+
+-- | A place in an operator. All else in the operator does nothing: when the
+-- behaviour in this place ends, the operator ends alike.
+data Place = Place
+  { placeName :: String
+  , placeLabel :: Maybe Label
+  -- ^ Of the thread that the behaviour runs in, if it is not the caller's.
+  , placed :: Behavior () -> Behavior ()
+  }
+
+instance Show Place where
+  show = placeName
+
+-- | The places where a behaviour runs in a thread of its own.
+threaded :: [Place]
+threaded = [place | place@Place {placeLabel = Just _} <- places]
+
+-- | The places where it runs in the caller's thread.
+inCaller :: [Place]
+inCaller = [place | place@Place {placeLabel = Nothing} <- places]
+
+places :: [Place]
+places =
+  [ inPlace "the first of ?" (? throwIO theFailure)
+  , inPlace "the second of ?" (failed ?)
+  , inPlace "the last of fallbackOver" $ \act ->
+      fallbackOver [False, True] (\isLast -> if isLast then act else failed)
+  , inPlace "attempt" (attempt 1)
+  , inPlace "failingOn" (failingOn noException)
+  , inThread "parallel" "left" (`parallel` hang)
+  , inThread "parallel" "right" (hang |||)
+  , inThread "both" "left" (`both` pure ())
+  , inThread "both" "right" (both (pure ()))
+  , inThread "firstOf" "1" (\act -> firstOf [act, hang, hang])
+  , inThread "firstOf" "2" (\act -> firstOf [hang, act, hang])
+  , inThread "allOf" "1" (\act -> void (allOf [act, pure (), pure ()]))
+  , inThread "allOf" "3" (\act -> void (allOf [pure (), pure (), act]))
+  , inThread "scoped" "body" (\act -> scoped (const act))
+  , inThread "scoped" "fork" $ \act ->
+      scoped (\nursery -> fork nursery act >>= atomically)
+  , inThread "timeout" "branch" (timeout 3600)
+  , inThread "rSelect" "left" (\act -> Signal.rSelect (pure True) act hang)
+  , inThread "rSelect" "right" (\act -> rSelect (pure False) hang act)
+  , inThread "monitor" "task" (monitor (pure False) hang)
+  , inThread "monitor" "recovery" $ \act -> do
+      needed <- newTVarIO True
+      let recovery = atomically (writeTVar needed False) >> act
+      Signal.monitor (Signal.watching (readTVar needed)) recovery (pure ())
+  , inThread "switch" "branch" (\act -> Signal.switch (pure 'a') (const act))
+  , inThread "teleoReactive" "rule 2" $ \act ->
+      Signal.teleoReactive [(pure False, hang), (pure True, act)]
+  , inThread "whileHolding" "branch" (Signal.whileHolding (pure True))
+  , inThread "withShared" "body" (\act -> Signal.withShared (pure ()) (const act))
+  , inThread "waitUntil" "polling" $ \act ->
+      Signal.waitUntil (Signal.polling 3600 (True <$ act))
+  ]
+ where
+  inPlace name = Place name Nothing
+  inThread operator name = Place (show label) (Just label) where label = Label operator name
+  noException :: SomeException -> Bool
+  noException _ = False
+
+-- | What a behaviour fails with that is tried in a place: there the second of '?',
+-- which runs when the first has failed, fails with it too.
+theFailure :: Failure
+theFailure = Failure "in its place"

@@ -1,0 +1,51 @@
+module Main (main) where
+
+import Test.Hspec
+
+import qualified Behavior.FailureSpec
+import qualified Behavior.MonitorSpec
+import qualified Behavior.OutcomeSpec
+import qualified Behavior.ParallelSpec
+import qualified Behavior.PollingSpec
+import qualified Behavior.PromisesSpec
+import qualified Behavior.ReactiveSpaceSpec
+import qualified Behavior.ReactiveSpec
+import qualified Behavior.RunBehaviorSpec
+import qualified Behavior.RuntimeSpec
+import qualified Behavior.SignalSpec
+import qualified Behavior.SpaceSpec
+import qualified Behavior.StormSpec
+import qualified Behavior.TimeSpec
+import qualified Examples.DoorBatterySpec
+import qualified Examples.ProgressProblemSpec
+import qualified Paper.DoorsSpec
+import qualified Paper.ErrataSpec
+import qualified Paper.ListingsSpec
+import qualified Paper.SyntaxSpec
+
+main :: IO ()
+main = hspec $ do
+  describe "Failure" Behavior.FailureSpec.spec
+  describe "Parallel" Behavior.ParallelSpec.spec
+  describe "Signal" $ do
+    Behavior.SignalSpec.spec
+    Behavior.PollingSpec.spec
+    Behavior.ReactiveSpec.spec
+    Behavior.MonitorSpec.spec
+    Behavior.OutcomeSpec.spec
+  describe "Time" Behavior.TimeSpec.spec
+  describe "Runtime" Behavior.RuntimeSpec.spec
+  describe "Running a program" Behavior.RunBehaviorSpec.spec
+  describe "Promises" Behavior.PromisesSpec.spec
+  describe "Storms" Behavior.StormSpec.spec
+  describe "Space" $ do
+    Behavior.SpaceSpec.spec
+    Behavior.ReactiveSpaceSpec.spec
+  describe "The paper" $ do
+    Paper.ListingsSpec.spec
+    Paper.DoorsSpec.spec
+    Paper.SyntaxSpec.spec
+    Paper.ErrataSpec.spec
+  describe "Examples" $ do
+    describe "door-battery" Examples.DoorBatterySpec.spec
+    describe "progress-problem" Examples.ProgressProblemSpec.spec

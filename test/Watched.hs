@@ -1,0 +1,184 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- What the specs of signals and of the reactive operators share: conditions that a
+-- test sets, branches that act in a chosen way when they are stopped, and a count of
+-- how many run at once.
+module Watched
+  ( -- * Conditions
+    Says (..)
+  , Dial
+  , newDial
+  , set
+  , says
+  , watched
+  , dialled
+
+    -- * Sensors
+  , Sensor
+  , newSensor
+  , sensor
+  , sensing
+  , readings
+  , readingsBeyond
+  , aWhile
+
+    -- * Branches
+  , Stopping (..)
+  , onStop
+  , awaitUnheard
+
+    -- * Gates
+  , opened
+
+    -- * Occupancy
+  , Room
+  , newRoom
+  , inside
+  , mostInside
+
+    -- * The operators
+  , Operator (..)
+  , operators
+  ) where
+
+import Control.Concurrent (ThreadId)
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception
+import Control.Monad (void)
+import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
+
+import Behavior (Behavior, Seconds, failWith)
+import Behavior.Internal.Runtime (atomically)
+import Behavior.Signal (Signal)
+import qualified Behavior.Signal as Signal
+import Support
+
+-- | What a condition says.
+data Says
+  = Says Bool
+  | SaysFailure
+  | SaysFault
+  | SaysNothing
+  deriving (Eq, Show)
+
+-- | A condition that the test sets.
+type Dial = TVar Says
+
+newDial :: Bool -> IO Dial
+newDial = newTVarIO . Says
+
+set :: Dial -> Says -> IO ()
+set dial = atomically . writeTVar dial
+
+says :: Dial -> STM Bool
+says dial =
+  readTVar dial >>= \case
+    Says holds -> pure holds
+    SaysFailure -> failWith "the sensor"
+    SaysFault -> throwSTM (Fault "the sensor")
+    SaysNothing -> retry
+
+watched :: Dial -> Signal Bool
+watched = Signal.watching . says
+
+-- | The signal of a plain variable.
+dialled :: TVar a -> Signal a
+dialled = Signal.watching . readTVar
+
+-- | A sensor that counts its readings, and does what the test says for each of
+-- them, by its number from 1.
+data Sensor a = Sensor (TVar Int) (Int -> Behavior a)
+
+newSensor :: (Int -> Behavior a) -> IO (Sensor a)
+newSensor act = (`Sensor` act) <$> newTVarIO 0
+
+-- | Reads the sensor.
+sensor :: Sensor a -> Behavior a
+sensor (Sensor count act) =
+  atomically (modifyTVar' count (+ 1) >> readTVar count) >>= act
+
+-- | Asks the sensor every millisecond.
+sensing :: Sensor a -> Signal a
+sensing = Signal.polling 0.001 . sensor
+
+-- | How many readings have begun.
+readings :: Sensor a -> IO Int
+readings (Sensor count _) = readTVarIO count
+
+-- | Waits until so many more readings have begun.
+readingsBeyond :: Int -> Sensor a -> IO ()
+readingsBeyond more s@(Sensor count _) = do
+  before <- readings s
+  atomically (readTVar count >>= check . (>= before + more))
+
+-- | As long as it takes a sensor of our own to be read twenty times, once in so
+-- many seconds: time for something to happen that must not.
+aWhile :: Seconds -> Behavior ()
+aWhile every = do
+  own <- newSensor (pure . (> 20))
+  Signal.waitUntil (Signal.polling every (sensor own))
+
+-- | What a branch does when it is asked to stop.
+data Stopping = Cleanly | Completing | Failing | Faulting
+  deriving (Eq, Show, Enum, Bounded)
+
+-- | Runs a branch, and when it is asked to stop does as it is told, with the given
+-- name: it stops, completes with that name, or fails or faults saying it.
+onStop :: Stopping -> String -> Behavior String -> Behavior String
+onStop how name act =
+  act `catch` \e -> case how of
+    Cleanly -> throwIO (e :: SomeAsyncException)
+    Completing -> pure name
+    Failing -> throwIO (Failure name)
+    Faulting -> throwIO (Fault name)
+
+-- | Returns once the thread waits for another one to hear an exception.
+awaitUnheard :: ThreadId -> IO ()
+awaitUnheard thread = eventually ((== ThreadBlocked BlockedOnException) <$> threadStatus thread)
+
+-- | Whether the gate is open.
+opened :: Gate -> IO Bool
+opened gate = atomically ((True <$ passed gate) `orElse` pure False)
+
+-- | Where at most one may be at a time.
+data Room = Room (TVar Int) (TVar Int)
+
+newRoom :: IO Room
+newRoom = Room <$> newTVarIO 0 <*> newTVarIO 0
+
+-- | Acts inside the room.
+inside :: Room -> IO a -> IO a
+inside (Room now most) = bracket_ enter leave
+ where
+  enter = atomically $ do
+    modifyTVar' now (+ 1)
+    n <- readTVar now
+    modifyTVar' most (max n)
+  leave = atomically (modifyTVar' now (subtract 1))
+
+-- | How many there have been at once, at most.
+mostInside :: Room -> IO Int
+mostInside (Room _ most) = readTVarIO most
+
+-- | An operator that runs one behaviour while its condition holds.
+data Operator = Operator
+  { operator :: String
+  , running :: Signal Bool -> Behavior String -> Behavior String -> Behavior String
+  -- ^ The condition; what runs while it holds; what runs while it does not, if the
+  -- operator has such a thing.
+  }
+
+instance Show Operator where
+  show = operator
+
+-- | All that interrupt a branch. 'Signal.monitor' watches for the contrary.
+operators :: [Operator]
+operators =
+  [ Operator "rSelect" Signal.rSelect
+  , Operator "monitor" (\c main other -> Signal.monitor (not <$> c) (void other) main)
+  , Operator "switch" (\c main other -> Signal.switch c (\holds -> if holds then main else other))
+  , Operator "teleoReactive" $ \c main other ->
+      Signal.teleoReactive [(c, main), (pure True, other)]
+  , Operator "whileHolding" (\c main _ -> Signal.whileHolding c main)
+  ]
