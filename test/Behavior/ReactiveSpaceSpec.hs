@@ -40,10 +40,10 @@ spec = around_ (within 120 . leavingNothing) . describe "In constant memory run"
               readTVar left >>= writeTVar dial . (> 0)
       Signal.monitor (dialled dial) recovery (pure ())
 
-  it "a million interruptions by monitor, and as many recoveries" $
-    inConstantMemory 1000000 $ \step -> do
+  it "a hundred thousand interruptions by monitor, and as many recoveries" $
+    inConstantMemory 100000 $ \step -> do
       dial <- newTVarIO False
-      left <- newTVarIO (1000000 :: Int)
+      left <- newTVarIO (100000 :: Int)
       let task = do
             step
             over <- atomically $ do

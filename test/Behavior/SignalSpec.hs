@@ -1,24 +1,18 @@
 -- |
--- What can be watched: 'Signal.watching', signals made of several,
--- 'Signal.debounce', 'Signal.hysteresis' and 'Signal.withShared'. Polling has a spec of
--- its own.
+-- What can be watched: 'Signal.watching', signals made of several, and
+-- 'Signal.withShared'. Polled signals, and refined ones, have specs of their own.
 module Behavior.SignalSpec (spec) where
 
-import Control.Concurrent (ThreadId, myThreadId)
-import Control.Concurrent.Async (Async, asyncThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
-import Control.Monad (replicateM_, unless)
+import Control.Monad (unless)
 import Data.Foldable (for_)
-import Data.IORef (atomicModifyIORef', newIORef, readIORef)
-import GHC.Conc (unsafeIOToSTM)
 import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
-import Test.QuickCheck (choose, forAll, ioProperty, listOf1, vectorOf, (===))
+import Test.QuickCheck (ioProperty, (===))
 
-import Behavior (Seconds, both, (?))
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, now, reportingTo)
-import Behavior.Signal (Signal)
+import Behavior (both, (?))
+import Behavior.Internal.Runtime (Event (..), Label (..), atomically, reportingTo)
 import qualified Behavior.Signal as Signal
 import Support
 import Watched
@@ -27,8 +21,6 @@ spec :: Spec
 spec = guarded $ do
   describe "watching" watchingIt
   describe "A signal made of several" several
-  describe "hysteresis" hysteresis
-  describe "debounce" debounce
   describe "withShared" sharing
 
 watchingIt :: Spec
@@ -103,187 +95,6 @@ started act = do
   events <- newNotebook
   _ <- reportingTo (note events) act
   notes events >>= \all' -> pure [label | Started label <- all']
-
-hysteresis :: Spec
-hysteresis = do
-  prop "is a fold over the values that were seen" $
-    forAll ((,) <$> thresholds <*> listOf1 (choose (0, 10))) $ \((low, high), levels) ->
-      ioProperty $ do
-        book <- newNotebook
-        position <- newTVarIO (0 :: Int)
-        let level = (levels !!) <$> dialled position
-            signal = (,) <$> dialled position <*> Signal.hysteresis low high level
-            branch (n, state) = do
-              note book state
-              unless (n + 1 == length levels) $ do
-                atomically (writeTVar position (n + 1))
-                hang
-        Signal.switch signal branch
-        let next state value = value >= high || (state && value > low)
-        (tail (scanl next False levels) ===) <$> notes book
-
-  it "remembers what its operator has acted on, before any other value can be seen" $
-    replicateM_ 200 $ do
-      level <- newRecorded (95 :: Int)
-      self <- myThreadId
-      let left = do
-            atomically (writeTVar (variable level) 50)
-            eventually ((>= 1) <$> looks level (== self) 50)
-            pure "left"
-      Signal.rSelect (Signal.hysteresis 10 90 (recorded level)) left (pure "right")
-        `shouldReturn` "left"
-
-  it "remembers also what changed nothing for its operator" $ do
-    book <- newNotebook
-    level <- newRecorded (0 :: Int)
-    armed <- newTVarIO False
-    entered <- newGate
-    let signal = (&&) <$> dialled armed <*> Signal.hysteresis 10 90 (recorded level)
-        cool = note book "cool" >> atomically (writeTVar (variable level) 10)
-        task = do
-          note book "task"
-          again <- (> 1) . length <$> notes book
-          unless again (open entered >> hang)
-    launching (Signal.monitor signal cool task) $ \caller -> do
-      pass entered
-      atomically (writeTVar (variable level) 95)
-      noticed level caller 95
-      atomically (writeTVar (variable level) 50 >> writeTVar armed True)
-      awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["task", "cool", "task"]
-
-  it "keeps its memory across recoveries" $ do
-    book <- newNotebook
-    level <- newTVarIO (95 :: Int)
-    let cool = do
-          note book =<< readTVarIO level
-          atomically (modifyTVar' level (subtract 30))
-    Signal.monitor (Signal.hysteresis 10 90 (dialled level)) cool (pure ())
-    notes book `shouldReturn` [95, 65, 35]
-
-  it "refuses thresholds the wrong way round, and nothing starts" $ do
-    book <- newNotebook
-    let signal = Signal.hysteresis 2 1 (Signal.polling 0.001 (1 <$ note book "reading"))
-    ending (Signal.rSelect signal (note book "left") (note book "right"))
-      `shouldReturn` FaultedWith "hysteresis: the lower threshold must not be above the upper one"
-    notes book `shouldReturn` []
- where
-  thresholds = do
-    ~[a, b] <- vectorOf 2 (choose (0, 10 :: Int))
-    pure (min a b, max a b)
-
--- | A variable whose signal records who has looked at it.
-data Recorded a = Recorded
-  { variable :: TVar a
-  , recorded :: Signal a
-  , looks :: (ThreadId -> Bool) -> a -> IO Int
-  -- ^ How often the threads that are meant have looked at it since it has this value.
-  }
-
-newRecorded :: Eq a => a -> IO (Recorded a)
-newRecorded initial = do
-  var <- newTVarIO initial
-  seen <- newIORef []
-  pure
-    Recorded
-      { variable = var
-      , recorded = Signal.watching $ do
-          value <- readTVar var
-          unsafeIOToSTM $ do
-            self <- myThreadId
-            value <$ atomicModifyIORef' seen (\all' -> ((self, value) : all', ()))
-      , looks = \meant value ->
-          length . takeWhile ((== value) . snd) . filter (meant . fst) <$> readIORef seen
-      }
-
--- | Waits until a worker of the operator that the caller runs has seen the value and
--- done what there is to do: it looks for the second time.
-noticed :: Recorded a -> Async b -> a -> IO ()
-noticed var caller value = eventually $ (>= 2) <$> looks var (/= asyncThreadId caller) value
-
-debounce :: Spec
-debounce = do
-  it "counts its first value at once" $
-    replicateM_ 200 $
-      Signal.rSelect (Signal.debounce (1 / 0) (pure True)) (pure "left") (pure "right")
-        `shouldReturn` "left"
-
-  it "counts a change once it has lasted for so long, and no sooner" $ do
-    dial <- newDial True
-    entered <- newGate
-    launching (Signal.rSelect (Signal.debounce 0.005 (watched dial)) (open entered >> hang) now) $
-      \caller -> do
-        pass entered
-        since <- now
-        set dial (Says False)
-        Gave over <- awaitEnd caller
-        over - since `shouldSatisfy` (>= 0.005)
-
-  for_ [("back and forth", [1, 0]), ("on and on", [1 ..])] $ \(manner, values) ->
-    it ("counts no value of those that go " ++ manner ++ " too fast") $ do
-      (value, counted, phases) <- flickering 0.002 (cycle values)
-      -- A value that counted had lasted: from just before it was set until the next one
-      -- was noticed. (On a slow machine that can be any.)
-      phases `shouldSatisfy` any (\(v, from, to) -> v == value && to - from >= 0.002 && counted - from >= 0.002)
-
-  it "counts at once the first value after a recovery" $ do
-    dial <- newDial True
-    Signal.monitor (Signal.debounce (1 / 0) (watched dial)) (set dial (Says False)) (pure "task")
-      `shouldReturn` "task"
-
-  it "of no duration follows its signal" $ do
-    dial <- newDial True
-    let left = set dial (Says False) >> hang
-    Signal.rSelect (Signal.debounce 0 (watched dial)) left (pure "right") `shouldReturn` "right"
-
-  for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
-    it ("does not wait, when its signal " ++ show news) $ do
-      dial <- newDial True
-      let left = set dial news >> hang
-      ending (Signal.rSelect (Signal.debounce (1 / 0) (watched dial)) left (pure ()))
-        `shouldReturn` case news of
-          SaysFailure -> FailedWith "FailedBecause \"the sensor\""
-          SaysFault -> FaultedWith (show (Fault "the sensor"))
-          _ -> FailedWith "FailedBecause \"the signal has no value any more\""
-
-  for_ [(-1, "-1.0"), (0 / 0, "NaN")] $ \(seconds, shown) ->
-    it ("refuses a duration of " ++ shown ++ ", and nothing starts") $ do
-      book <- newNotebook
-      let signal = Signal.debounce seconds (Signal.polling 0.001 (True <$ note book "reading"))
-      ending (Signal.rSelect signal (note book "left") (note book "right"))
-        `shouldReturn` FaultedWith ("debounce: a duration is zero or more seconds, not " ++ shown)
-      notes book `shouldReturn` []
-
--- | Sets one value after the other, each once the last was noticed, until well after
--- the first could have counted; then leaves it at a value other than the first. Says
--- which value came to count, when, and from when to when there was each.
-flickering :: Seconds -> [Int] -> IO (Int, Seconds, [(Int, Seconds, Seconds)])
-flickering duration values = do
-  level <- newRecorded 0
-  entered <- newGate
-  counted <- newGate
-  let branch 0 = open entered >> hang
-      branch value = now >>= \t -> (value, t) <$ open counted
-  launching (Signal.switch (Signal.debounce duration (recorded level)) branch) $ \caller -> do
-    pass entered
-    first <- now
-    let settle phases value = do
-          from <- now
-          atomically (writeTVar (variable level) value)
-          Gave (what, when') <- awaitEnd caller
-          pure (what, when', reverse ((value, from, when') : phases))
-        go phases [] = settle phases 1
-        go phases (value : others) = do
-          from <- now
-          over <- opened counted
-          if value /= 0 && (over || from - first > 3 * duration)
-            then settle phases value
-            else do
-              atomically (writeTVar (variable level) value)
-              eventually $ (||) <$> opened counted <*> ((>= 2) <$> looks level (/= asyncThreadId caller) value)
-              to <- now
-              go ((value, from, to) : phases) others
-    go [] values
 
 sharing :: Spec
 sharing = do

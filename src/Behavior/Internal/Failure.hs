@@ -45,6 +45,7 @@ import Control.Exception
   ( Exception (..)
   , SomeAsyncException
   , SomeException (..)
+  , catch
   , throwIO
   , try
   )
@@ -161,12 +162,11 @@ failWith = throwM . FailedBecause
 -- @since 0.1.0.0
 failingOn :: Exception e => (e -> Bool) -> Behavior a -> Behavior a
 failingOn chosen act =
-  try act >>= \case
-    Right a -> pure a
-    Left e
-      | isCancellation e || isFailure e -> throwIO e
-      | Just fault <- fromException e, chosen fault -> throwIO (asFailure e)
-      | otherwise -> throwIO e
+  -- 'catch', not 'try': between a 'try' and the rethrowing a second cancellation
+  -- could take the place of what was caught.
+  act `catch` \e -> case fromException e of
+    Just fault | not (isFailure e || isCancellation e), chosen fault -> throwIO (asFailure e)
+    _ -> throwIO e
  where
   asFailure (SomeException e) = BehaviorFailed e
 
@@ -181,10 +181,7 @@ isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 
 -- | 'try' that lets cancellations through.
 trySynchronous :: IO a -> IO (Either SomeException a)
-trySynchronous act =
-  try act >>= \case
-    Left e | isCancellation e -> throwIO e
-    result -> pure result
+trySynchronous act = (Right <$> act) `catch` \e -> if isCancellation e then throwIO e else pure (Left e)
 
 -- | @fallback first second@ runs @first@; if that /fails/, it runs @second@.
 --

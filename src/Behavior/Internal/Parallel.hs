@@ -178,30 +178,36 @@ data Request = Request (Behavior ()) (TMVar ())
 --
 -- @since 0.1.0.0
 scoped :: (Nursery -> Behavior a) -> Behavior a
-scoped body = structured $ \scope -> do
+scoped body = do
   requests <- newTVarIO (Just [])
-  trouble <- newTVarIO False
-  main <- branch scope (Label "scoped" "body") (body (Nursery requests))
-  let serve children = do
-        next <- atomically (asum [Left . settle <$> outcome main, Left <$> alarm, Right <$> arrived])
-        case next of
-          Left verdict -> pure verdict
-          Right new -> do
-            forked <- for new $ \(Request act accepted) ->
-              branch scope (Label "scoped" "fork") (act `alarming` trouble)
-                <* atomically (putTMVar accepted ())
-            living <- filterM alive children
-            serve (living ++ forked)
-       where
-        alarm = readTVar trouble >>= check >> throwIO <$> asum (uncompleted <$> children)
-      arrived =
-        readTVar requests >>= \case
-          Just new@(_ : _) -> reverse new <$ writeTVar requests (Just [])
-          _ -> retry
-      alive child = do
-        over <- atomically ((True <$ completed child) `orElse` pure False)
-        if over then False <$ forget scope child else pure True
-  serve [] `finally` atomically (writeTVar requests Nothing)
+  -- It closes only when all have ended: of those who are still being stopped, some
+  -- may just be forking.
+  structured (serving requests) `finally` atomically (writeTVar requests Nothing)
+ where
+  serving requests scope = do
+    trouble <- newTVarIO False
+    main <- branch scope (Label "scoped" "body") (body (Nursery requests))
+    let -- The children that live, or died of something, the newest first.
+        serve children = do
+          next <- atomically (asum [Left . settle <$> outcome main, Left <$> alarm, Right <$> arrived])
+          case next of
+            Left verdict -> pure verdict
+            Right new -> do
+              forked <- for new $ \(Request act accepted) ->
+                branch scope (Label "scoped" "fork") (act `alarming` trouble)
+                  <* atomically (putTMVar accepted ())
+              living <- filterM alive children
+              serve (reverse forked ++ living)
+         where
+          alarm = readTVar trouble >>= check >> throwIO <$> asum (uncompleted <$> reverse children)
+        arrived =
+          readTVar requests >>= \case
+            Just new@(_ : _) -> reverse new <$ writeTVar requests (Just [])
+            _ -> retry
+        alive child = do
+          over <- atomically ((True <$ completed child) `orElse` pure False)
+          if over then False <$ forget scope child else pure True
+    serve []
 
 -- | Starts a behaviour that runs until it ends by itself, or 'scoped' ends. The
 -- transaction that it returns waits for the result.

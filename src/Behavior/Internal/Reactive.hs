@@ -20,9 +20,10 @@ module Behavior.Internal.Reactive
   , whileHolding
   ) where
 
-import Control.Concurrent.STM (check, orElse)
-import Control.Exception (throwIO)
-import Data.Foldable (for_)
+import Control.Concurrent.STM (STM, check, orElse)
+import Control.Exception (SomeException, throwIO)
+import Control.Monad (join)
+import Data.Foldable (asum)
 import Data.List (findIndex)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
@@ -57,27 +58,29 @@ react operator signal reaction = structured $ \scope -> do
 
       -- Nothing runs: read, and do what the value says now.
       choose sensors seen moment = do
-        let value = (for_ sensors unlessLost >>) . look seen
-        trySynchronous (atomically (value moment)) >>= obeying sensors (value Later)
+        first <- observe (attend sensors (look seen moment))
+        obeying sensors (look seen Later) first
 
       obeying sensors value = \case
-        Left lost -> pure (throwIO lost)
+        Left dead -> pure (throwIO dead)
         Right old -> case reaction old of
           Conclude verdict -> pure verdict
           RunToEnd name recovery -> do
             askWithoutWaiting (map SomeBranch sensors)
             recover sensors name recovery Nothing
-          Idle -> trySynchronous (atomically (changed value old)) >>= obeying sensors value
+          Idle -> observe (attend sensors (changed value old)) >>= obeying sensors value
           Run name act -> do
             running <- branch scope (Label operator name) act
             -- The branch is looked at first: one that has ended by itself is not
             -- interrupted, whatever the signal says in the same transaction.
-            event <- trySynchronous . atomically $
-              (Left <$> outcome running) `orElse` (Right <$> changed value old)
+            event <-
+              observe $
+                (Right . Left <$> outcome running)
+                  `orElse` (fmap Right <$> attend sensors (changed value old))
             case event of
               Right (Left ended) -> pure (settle ended)
               Right (Right new) -> interrupt sensors running (reaction new)
-              Left lost -> interrupt sensors running (Conclude (throwIO lost))
+              Left dead -> interrupt sensors running (Conclude (throwIO dead))
 
       -- What is to come comes if the branch stops as it is asked to. If it
       -- completes all the same, it has completed, and that is the end.
@@ -122,6 +125,14 @@ react operator signal reaction = structured $ \scope -> do
     new <- value
     check (new /= old)
     pure new
+
+-- | Looks at a value, and first at the sensors that it comes from.
+attend :: [Branch ()] -> STM a -> STM (Either SomeException a)
+attend sensors value = (Left <$> asum (map lost sensors)) `orElse` (Right <$> value)
+
+-- | Waits for a transaction; what it throws is a sensor's.
+observe :: STM (Either SomeException a) -> IO (Either SomeException a)
+observe = fmap join . trySynchronous . atomically
 
 -- | Waits until a branch that was asked to stop has ended. If it faulted it stays
 -- in the scope, which throws its fault.

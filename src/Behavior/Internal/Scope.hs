@@ -133,8 +133,13 @@ worker (Scope branches) label act = mask_ $ do
 -- | Takes a branch that has ended, and did not fault, out of the scope, which
 -- otherwise would grow with every branch that an operator ever started.
 forget :: Scope -> Branch a -> IO ()
-forget (Scope branches) old =
-  modifyIORef' branches (filter (\(SomeBranch b) -> branchThread b /= branchThread old))
+forget (Scope branches) old = modifyIORef' branches without
+ where
+  -- Strict: an unevaluated list would hold on to what was taken out of it.
+  without [] = []
+  without (SomeBranch b : others)
+    | branchThread b == branchThread old = others
+    | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
 -- | Asks branches to stop, all at once: none hears it later because another cannot
 -- be interrupted just now. Returns when the last of the list has heard it.

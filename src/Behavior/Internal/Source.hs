@@ -10,7 +10,7 @@ module Behavior.Internal.Source
   , View (..)
   , Moment (..)
   , startWorkers
-  , unlessLost
+  , lost
 
     -- * Making them
   , watching
@@ -311,14 +311,16 @@ hysteresis low high signal = Signal $ do
   let state value = do
         v <- value
         before <- readTVar memory
-        pure (v >= high || (before && v > low))
-      -- What a look finds out is lost when the operator goes on waiting, so a
-      -- thread of its own remembers it.
+        let after = v >= high || (before && v > low)
+        when (after /= before) (writeTVar memory after)
+        pure after
+      -- What a look finds out is remembered if the operator acts on it, in the same
+      -- transaction, and is undone if the operator goes on waiting. Then this
+      -- remembers it.
       remembering value = forever . atomically $ do
         before <- readTVar memory
         after <- state value
         check (after /= before)
-        writeTVar memory after
   pure
     source
       { workers = workers source ++ [Worker "hysteresis" (const . remembering . quietly <$> view source)]
@@ -346,22 +348,27 @@ quietly v = look v First `catchSTM` \(_ :: SomeException) -> retry
 --
 -- @since 0.1.0.0
 withShared :: Signal a -> (Signal a -> Behavior b) -> Behavior b
-withShared signal body = structured $ \scope -> do
-  source <- open signal
-  others <- newEmptyTMVarIO
+withShared signal body = do
   closed <- newTVarIO False
-  let shared = Signal $ do
-        atomically stillOpen
-        running <- atomically (readTMVar others)
-        let attended value = stillOpen >> for_ running unlessLost >> value
-        pure source {workers = [], view = looking attended <$> view source}
-      stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
-  -- The body comes first, so that its fault is the leftmost.
-  main <- branch scope (Label "withShared" "body") (body shared)
-  (_, running) <- startWorkers scope "withShared" source
-  atomically (putTMVar others running)
-  (settle <$> atomically (outcome main)) `finally` atomically (writeTVar closed True)
+  -- It closes only when all have ended: of those who are still being stopped, some
+  -- may just be looking.
+  structured (sharing closed) `finally` atomically (writeTVar closed True)
  where
+  sharing closed scope = do
+    source <- open signal
+    others <- newEmptyTMVarIO
+    let shared = Signal $ do
+          atomically stillOpen
+          running <- atomically (readTMVar others)
+          let attended value = stillOpen >> for_ running unlessLost >> value
+          pure source {workers = [], view = looking attended <$> view source}
+        stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
+        unlessLost sensor = (lost sensor >>= throwSTM) `orElse` pure ()
+    -- The body comes first, so that its fault is the leftmost.
+    main <- branch scope (Label "withShared" "body") (body shared)
+    (_, running) <- startWorkers scope "withShared" source
+    atomically (putTMVar others running)
+    settle <$> atomically (outcome main)
   closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"
 
 -- | Starts what must run while the source is looked at, and gives a view of it. The
@@ -374,6 +381,11 @@ startWorkers scope operator source = do
     worker scope (Label operator (workerName w)) run
   pure (seen, running)
 
--- | Throws what a worker threw that has died of it.
-unlessLost :: Branch () -> STM ()
-unlessLost dead = (uncompleted dead >>= throwSTM) `orElse` pure ()
+-- | Waits until a worker has died, and says of what. (One that was asked to stop has
+-- not.)
+lost :: Branch () -> STM SomeException
+lost sensor =
+  outcome sensor >>= \case
+    Failing e -> pure e
+    Faulted e -> pure e
+    _ -> retry
