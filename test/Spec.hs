@@ -4,12 +4,15 @@ import Test.Hspec
 
 import qualified Behavior.FailureSpec
 import qualified Behavior.MonitorSpec
+import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
 import qualified Behavior.ParallelSpec
+import qualified Behavior.PolledSpec
 import qualified Behavior.PollingSpec
 import qualified Behavior.PromisesSpec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
+import qualified Behavior.RefinedSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
 import qualified Behavior.SignalSpec
@@ -30,9 +33,12 @@ main = hspec $ do
   describe "Signal" $ do
     Behavior.SignalSpec.spec
     Behavior.PollingSpec.spec
+    Behavior.RefinedSpec.spec
+    Behavior.OperatorsSpec.spec
+    Behavior.OutcomeSpec.spec
     Behavior.ReactiveSpec.spec
     Behavior.MonitorSpec.spec
-    Behavior.OutcomeSpec.spec
+  describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
   describe "Time" Behavior.TimeSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec

@@ -274,7 +274,8 @@ cancelledWhile act how = do
       caller = leavingNothing (act probe) `onException` note book "the operator"
   end <- launching caller $ \thread -> do
     pass reached
-    throwing (asyncThreadId thread) (Cancel "the caller")
+    -- It is delivered when this returns: the caller waits where it can be interrupted.
+    throwTo (asyncThreadId thread) (Cancel "the caller")
     open release
     awaitEnd thread
   ran <- notes book

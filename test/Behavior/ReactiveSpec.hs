@@ -87,7 +87,7 @@ selecting = do
             (atomically (writeTVar runs (Just own)) >> pass over)
               `onException` replicateM_ 3 yield
     launching (Signal.rSelect (dialled dial) (branch True) (branch False)) $ \caller -> do
-      for_ [1 .. 3000 :: Int] $ \n -> do
+      for_ [1 .. 500 :: Int] $ \n -> do
         atomically (modifyTVar' dial not)
         -- Two times of three what the condition says may come to run.
         unless (n `mod` 3 == 0) . atomically $

@@ -162,10 +162,11 @@ polling every act = Signal $ do
   underWay <- newTVarIO Nothing
   let readAt slot asked = do
         sleepUntil slot
+        begun <- now
         number <- atomically $ do
-          writeTVar underWay (Just slot)
+          writeTVar underWay (Just begun)
           modifyTVar' started (+ 1)
-          writeTVar nextSlot (Just (slot + every))
+          writeTVar nextSlot (Just (begun + every))
           readTVar started
         read' <- trySynchronous act
         stopping <- asked
@@ -176,7 +177,7 @@ polling every act = Signal $ do
           else do
             atomically (writeTVar newest (Just (number, read')) >> writeTVar underWay Nothing)
             t <- now
-            readAt (slotAfter (slot + every) t) asked
+            readAt (slotAfter (begun + every) t) asked
       slotAfter slot t
         | slot >= t = slot
         | otherwise = slot + every * fromInteger (ceiling ((t - slot) / every))
@@ -376,7 +377,7 @@ withShared signal body = do
 -- first reading, and wait for a second one.
 startWorkers :: Scope -> String -> Source a -> IO (View a, [Branch ()])
 startWorkers scope operator source = do
-  (seen, works) <- atomically ((,) <$> view source <*> traverse work (workers source))
+  (works, seen) <- atomically ((,) <$> traverse work (workers source) <*> view source)
   running <- for (zip (workers source) works) $ \(w, run) ->
     worker scope (Label operator (workerName w)) run
   pure (seen, running)
