@@ -1,8 +1,9 @@
-.PHONY: help demo test warnings doctest readme lint docs check matrix ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
 	@echo 'make test      the test suite, under three runtimes (ARGS="-m NAME" selects tests)'
+	@echo 'make programs  run the example programs and check how each run ends'
 	@echo 'make warnings  build everything with warnings as errors'
 	@echo 'make doctest   run the examples in the documentation'
 	@echo 'make readme    run the program in README.md'
@@ -20,7 +21,7 @@ demo:
 test:
 	@.ci/test $(ARGS)
 
-warnings doctest readme lint docs check:
+programs warnings doctest readme lint docs check:
 	@.ci/$@
 
 matrix:

@@ -185,11 +185,12 @@ stillRunning caller = do
   over <- poll caller
   unless (isNothing over) $ expectationFailure "it has ended already"
 
--- | Returns once the thread waits (in a transaction or at an 'MVar'), or is over.
+-- | Returns once the thread waits (in a transaction, at an 'MVar', or for the time),
+-- or is over.
 awaitIdle :: ThreadId -> IO ()
 awaitIdle thread = eventually $ (`elem` idle) <$> threadStatus thread
  where
-  idle = [ThreadBlocked BlockedOnSTM, ThreadBlocked BlockedOnMVar, ThreadFinished, ThreadDied]
+  idle = map ThreadBlocked [BlockedOnSTM, BlockedOnMVar, BlockedOnOther] ++ [ThreadFinished, ThreadDied]
 
 -- | Returns once the thread is over, so that whoever looks sees how it ended.
 awaitOver :: ThreadId -> IO ()

@@ -100,18 +100,14 @@ selecting = do
     room <- newRoom
     dial <- newTVarIO True
     ran <- newTVarIO (0 :: Int)
-    over <- newTVarIO False
-    let flicker = do
-          atomically (modifyTVar' dial not)
-          readTVarIO over >>= \isOver -> unless isOver flicker
-        branch = inside room (atomically (modifyTVar' ran (+ 1)))
-    launching flicker $ \flickering -> do
-      -- A run that was stopped before it could count is begun anew: every run that
-      -- counts has completed, and must be the only one.
-      replicateM_ 2000 $ Signal.rSelect (dialled dial) (mask_ branch) (mask_ branch)
-      atomically (writeTVar over True)
+    -- Masked, it runs wholly or not at all: a run that counts has completed, and must be
+    -- the only one.
+    let branch = mask_ (inside room (atomically (modifyTVar' ran (+ 1))))
+        flicker = replicateM_ 20 (atomically (modifyTVar' dial not) >> yield)
+    replicateM_ 500 . launching flicker $ \flickering -> do
+      Signal.rSelect (dialled dial) branch branch
       awaitEnd flickering `shouldReturn` Gave ()
-    readTVarIO ran `shouldReturn` 2000
+    readTVarIO ran `shouldReturn` 500
     mostInside room `shouldReturn` 1
 
   it "does what the condition says when the old branch has ended, not when it changed" $ do

@@ -30,7 +30,7 @@ spec = guarded . describe "runBehavior" $ do
   it "runs it in an unbound thread, labelled, and unmasked" $ do
     (end, events) <- observing $ \notebook -> reportingTo (note notebook) $
       bound (mask_ (runBehavior ((,) <$> isCurrentThreadBound <*> getMaskingState)))
-    end `shouldBe` Gave (not rtsSupportsBoundThreads, Unmasked)
+    end `shouldBe` Gave (False, Unmasked)
     events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
 
   for_ [(sigINT, "SIGINT", 130), (sigTERM, "SIGTERM", 143)] $ \(signal, name, code) -> do

@@ -278,5 +278,5 @@ pairs = do
 
   it "says what it holds" $ do
     let pair = StoppedWithFault (toException (Cancel "user")) (toException (Fault "bug"))
-    show (Just pair) `shouldBe` "Just (StoppedWithFault Cancel \"user\" Fault \"bug\")"
+    show (Just pair) `shouldBe` "Just (StoppedWithFault (Cancel \"user\") (Fault \"bug\"))"
     displayException pair `shouldBe` "stopped by Cancel \"user\", and while stopping: Fault \"bug\""
