@@ -2,6 +2,7 @@ module Main (main) where
 
 import Test.Hspec
 
+import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.MonitorSpec
 import qualified Behavior.OperatorsSpec
@@ -33,6 +34,7 @@ main = hspec $ do
   describe "Signal" $ do
     Behavior.SignalSpec.spec
     Behavior.PollingSpec.spec
+    Behavior.BadReadingSpec.spec
     Behavior.RefinedSpec.spec
     Behavior.OperatorsSpec.spec
     Behavior.OutcomeSpec.spec

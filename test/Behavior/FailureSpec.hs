@@ -145,7 +145,7 @@ fallbacksOver = do
   it "is act x ? act y ? act z" $
     property $ \(scripts :: NonEmptyList Script) ->
       sameAs
-        (\notebook -> fallbackOver (getNonEmpty scripts) (play notebook))
+        (fallbackOver (getNonEmpty scripts) . play)
         (\notebook -> foldr1 (?) (map (play notebook) (getNonEmpty scripts)))
 
   it "fails with Failed on nothing" $

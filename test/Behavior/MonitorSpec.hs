@@ -8,10 +8,10 @@ import Control.Concurrent (yield)
 import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
-import Control.Monad (replicateM_, unless)
+import Control.Monad (replicateM_, unless, void)
 import Data.Foldable (for_)
 import Test.Hspec
-import Test.Hspec.QuickCheck (prop)
+import Test.Hspec.QuickCheck (modifyMaxSize, prop)
 import Test.QuickCheck (NonNegative (..), ioProperty, (===))
 
 import Behavior.Internal.Runtime (atomically)
@@ -29,7 +29,7 @@ spec = guarded . describe "monitor" $ do
     notes book `shouldReturn` ["recovery", "task"]
 
   -- The task asks for as many recoveries in a row as the script says, again and again.
-  prop "recovers until the condition is false, and begins the task anew" $ \script ->
+  modifyMaxSize (const 15) . prop "recovers until the condition is false, and begins the task anew" $ \script ->
     ioProperty $ do
       book <- newNotebook
       left <- newTVarIO (map getNonNegative script :: [Int])
@@ -43,7 +43,7 @@ spec = guarded . describe "monitor" $ do
             unless over hang
           recovery = note book "recovery" >> atomically (modifyTVar' needed (subtract 1))
       Signal.monitor ((> 0) <$> dialled needed) recovery task
-      let expected = concatMap (\n -> "task" : replicate (n + 1) "recovery") (map getNonNegative script)
+      let expected = concatMap (\(NonNegative n) -> "task" : replicate (n + 1) "recovery") script
       (expected ++ ["task"] ===) <$> notes book
 
   it "recovers even if the condition is false again when the task has ended" $ do
@@ -175,7 +175,7 @@ spec = guarded . describe "monitor" $ do
       book <- newNotebook
       dial <- newDial True
       entered <- newGate
-      let recovery = () <$ onStop how "recovery" (open entered >> hang)
+      let recovery = void $ onStop how "recovery" (open entered >> hang)
           act = leavingNothing (Signal.monitor (watched dial) recovery (note book "task"))
       cancelling act (pass entered) `shouldReturn` case how of
         Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "recovery"))

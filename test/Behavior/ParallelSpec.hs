@@ -10,6 +10,7 @@ import Control.Exception
 import Control.Monad (forM, forever, replicateM, replicateM_, unless, void, when)
 import Data.Foldable (for_, traverse_)
 import qualified Data.Map as Map
+import Data.Traversable (for)
 import System.IO.Unsafe (unsafeInterleaveIO)
 import Test.Hspec hiding (parallel)
 import Test.QuickCheck hiding (Failure, within)
@@ -247,7 +248,7 @@ ties = do
       let act there final = myThreadId >>= putMVar there >> pass cue >> final
           [left', right'] = zipWith act inside [left, right]
       launching (operator left' right') $ \caller -> do
-        for_ inside $ \there -> readMVar there >>= awaitIdle
+        traverse readMVar inside >>= traverse_ awaitIdle
         awaitIdle (asyncThreadId caller)
         open cue
         awaitEnd caller
@@ -332,10 +333,8 @@ laws = do
     property $ \a ->
       forAll (elements [0, 1, 2 :: Int]) $ \place ->
         let among others notebook = [if n == place then void (play notebook a) else others | n <- [0 .. 2]]
-            leftwards operator = foldl1 operator
-            rightwards operator = foldr1 operator
-         in sameAs (leftwards parallel . among hang) (rightwards parallel . among hang)
-              .&&. sameAs (leftwards both . among (pure ())) (rightwards both . among (pure ()))
+         in sameAs (foldl1 parallel . among hang) (foldr1 parallel . among hang)
+              .&&. sameAs (foldl1 both . among (pure ())) (foldr1 both . among (pure ()))
  where
   forAllCasts law =
     forAll (actors <$> vectorOf 2 arbitrary) $ \cast ->
@@ -411,8 +410,8 @@ many = do
 -- they open are open.
 groups :: [(String, Int, [Behavior ()] -> Behavior ())]
 groups =
-  [ ("parallel", 2, \acts -> foldr1 parallel acts)
-  , ("both", 2, \acts -> foldr1 both acts)
+  [ ("parallel", 2, foldr1 parallel)
+  , ("both", 2, foldr1 both)
   , ("firstOf", 4, firstOf)
   , ("allOf", 4, void . allOf)
   , ("scoped", 4, \acts -> scoped $ \nursery -> traverse_ (fork nursery) (tail acts) >> head acts)
@@ -464,8 +463,8 @@ nurseries = do
   it "gives the results of what was forked" $
     scoped
       ( \nursery -> do
-          answers <- for' [1 .. 10 :: Int] (fork nursery . pure)
-          for' answers atomically
+          answers <- for [1 .. 10 :: Int] (fork nursery . pure)
+          for answers atomically
       )
       `shouldReturn` [1 .. 10]
 
@@ -557,5 +556,4 @@ nurseries = do
         yielding n
       end `shouldBe` Gave ()
  where
-  for' = flip traverse
   yielding n = replicateM_ (n `mod` 20) yield

@@ -1,18 +1,19 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- |
--- 'Signal.polling' and 'Signal.staleAfter': when a sensor is read, by whom, and what
--- becomes of a reading that goes wrong. The readings drive these tests: each counts,
--- waits at a gate or asks the clock.
+-- 'Signal.polling': when a sensor is read, by whom, and what counts. The readings drive
+-- these tests: each counts, waits at a gate or asks the clock. Those that go wrong have
+-- a spec of their own.
 module Behavior.PollingSpec (spec) where
 
 import Control.Concurrent (myThreadId)
-import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (replicateM_, unless, void, when)
 import Data.Foldable (for_)
 import Test.Hspec hiding (after, before)
 
-import Behavior (Behavior, Seconds, failWith)
+import Behavior (Behavior, Seconds)
 import Behavior.Internal.Runtime (Event (..), Label (..), atomically, now, reportingTo)
 import qualified Behavior.Signal as Signal
 import Support
@@ -22,9 +23,7 @@ spec :: Spec
 spec = guarded $ do
   describe "polling, when it reads:" slots
   describe "polling, what counts:" counting
-  describe "polling, a reading that" goingWrong
   describe "polling, around a recovery:" recovering
-  describe "staleAfter" stale
 
 -- | The moments at which readings began and ended, the first reading first.
 type Times = Notebook (Seconds, Seconds)
@@ -123,7 +122,7 @@ counting = do
       stillRunning caller
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["read", "left"]
+    take 2 <$> notes book `shouldReturn` ["read", "left"]
 
   it "after a branch has ended a reading is awaited that began after that" $ do
     book <- newNotebook
@@ -191,119 +190,6 @@ counting = do
     notes events
       `shouldReturn` [f (Label "waitUntil" "polling") | f <- [Started, Ended]]
     notes threads >>= (`shouldSatisfy` \(one : others) -> all (== one) others)
-
-goingWrong :: Spec
-goingWrong = do
-  for_ operators $ \op ->
-    for_ faulty $ \(manner, act, end) ->
-      it (unwords [manner, "ends", show op, "after its branch"]) $ do
-        book <- newNotebook
-        entered <- newGate
-        level <- newSensor $ \_ -> opened entered >>= \isEntered -> if isEntered then act else pure True
-        let main =
-              (open entered >> hang) `onException` do
-                note book "main is over"
-            other = note book "other" >> pure "other"
-        ending (running op (sensing level) main other `onException` note book "over")
-          `shouldReturn` end
-        notes book `shouldReturn` ["main is over", "over"]
-
-  for_ faulty $ \(manner, act, end) ->
-    it (manner ++ " the first time starts nothing") $ do
-      book <- newNotebook
-      ending (Signal.rSelect (Signal.polling 0.001 act) (note book "l") (note book "r"))
-        >>= (`shouldBe` fmap' end)
-      notes book `shouldReturn` []
-
-  it "swallows the request to stop does not keep the operator from ending" $ do
-    entered <- newGate
-    level <- newSensor $ \_ -> do
-      open entered
-      hang `catch` \e -> pure (null (show (e :: SomeAsyncException)))
-    cancelling (Signal.waitUntil (sensing level)) (pass entered)
-      `shouldReturn` CancelledBy (show (Cancel "the caller"))
-    readings level `shouldReturn` 1
-
-  for_ [minBound .. maxBound] $ \how ->
-    it (unwords ["is stopped because the branch has completed, and then", manners how]) $ do
-      entered <- newGate
-      started <- newGate
-      level <- newSensor $ \_ -> do
-        isStarted <- opened started
-        when isStarted . void $ onStop how "reading" (open entered >> hang)
-        pure True
-      end <- ending (Signal.rSelect (sensing level) (open started >> pass entered) (pure ()))
-      end `shouldBe` case how of
-        Faulting -> FaultedWith (show (Fault "reading"))
-        _ -> Gave ()
-
-  for_ [minBound .. maxBound] $ \how ->
-    it (unwords ["is stopped because the caller is cancelled, and then", manners how]) $ do
-      entered <- newGate
-      level <- newSensor $ \_ -> True <$ onStop how "reading" (open entered >> hang)
-      end <- cancelling (leavingNothing (Signal.waitUntil (sensing level))) (pass entered)
-      end `shouldBe` case how of
-        Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "reading"))
-        _ -> CancelledBy (show (Cancel "the caller"))
-
-  it "cannot be interrupted has ended before its operator" $ do
-    book <- newNotebook
-    started <- newGate
-    entered <- newGate
-    release <- newGate
-    level <- newSensor $ \_ -> do
-      isStarted <- opened started
-      when isStarted . uninterruptibleMask_ $ do
-        open entered
-        pass release
-        note book "reading is over"
-      pure True
-    let act = do
-          Signal.rSelect (sensing level) (open started >> pass entered >> note book "branch is over") (pure ())
-          note book "operator is over"
-    launching act $ \caller -> do
-      eventually ((== ["branch is over"]) <$> notes book)
-      awaitUnheard (asyncThreadId caller)
-      open release
-      awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["branch is over", "reading is over", "operator is over"]
-
-  for_ ["reading", "branch"] $ \deaf ->
-    it ("has to stop hears it at once, with the branch, though the " ++ deaf ++ " is deaf") $ do
-      started <- newGate
-      readingEntered <- newGate
-      heard <- newGate
-      release <- newGate
-      let being name entered
-            | name == deaf = uninterruptibleMask_ (open entered >> pass release)
-            | otherwise = (open entered >> hang) `onException` open heard
-      level <- newSensor $ \_ -> do
-        isStarted <- opened started
-        when isStarted (being "reading" readingEntered)
-        pure True
-      let act = Signal.rSelect (sensing level) (being "branch" started) (pure ())
-      launching act $ \caller -> do
-        pass readingEntered
-        throwing (asyncThreadId caller) (Cancel "the caller")
-        -- It is the other one that hears, while the deaf one still waits.
-        pass heard
-        open release
-        awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "the caller"))
- where
-  faulty =
-    [ ("fails", failWith "no echo", FailedWith "FailedBecause \"no echo\"")
-    , ("faults", throwIO (Fault "no echo"), FaultedWith (show (Fault "no echo")))
-    ] ::
-      [(String, Behavior Bool, Ending String)]
-  fmap' end = case end of
-    FailedWith why -> FailedWith why
-    FaultedWith what -> FaultedWith what
-    _ -> Gave ()
-  manners how = case how of
-    Cleanly -> "stops"
-    Completing -> "returns all the same"
-    Failing -> "fails: which nobody minds"
-    Faulting -> "faults: which gets out"
 
 -- | A monitor that has a polled sensor and an alarm, which alone decides; whose task
 -- is under way, and whose sensor is just being read, once the gate is open. From then
@@ -400,9 +286,30 @@ recovering = do
       awaitEnd caller `shouldReturn` Gave ()
     notes book `shouldReturn` ["recovery", "task"]
 
+  it "task and reading are asked to stop at once: the one hears it while the other is deaf" $ do
+    alarm <- newTVarIO False
+    started <- newGate
+    entered <- newGate
+    heard <- newGate
+    release <- newGate
+    level <- newSensor $ \_ -> do
+      isStarted <- opened started
+      over <- opened heard
+      when (isStarted && not over) $ (open entered >> hang) `onException` open heard
+    let task = do
+          again <- opened started
+          unless again $ uninterruptibleMask_ (open started >> pass release)
+        recovery = atomically (writeTVar alarm False)
+    launching (Signal.monitor (const <$> dialled alarm <*> sensing level) recovery task) $ \caller -> do
+      pass entered
+      atomically (writeTVar alarm True)
+      pass heard
+      open release
+      awaitEnd caller `shouldReturn` Gave ()
+
   it "a reading that swallows the request to stop does not keep the monitor from going on" $ do
     s <- scene $ \entered n ->
-      when (n == 1) $ (open entered >> hang) `catch` \e -> const (pure ()) (e :: SomeAsyncException)
+      when (n == 1) $ (open entered >> hang) `catch` \(_ :: SomeAsyncException) -> pure ()
     launching (monitoring s) $ \caller -> do
       raise s
       awaitEnd caller `shouldReturn` Gave ()
@@ -418,86 +325,3 @@ recovering = do
         (end, ran) `shouldBe` case how of
           Faulting -> (FaultedWith (show (Fault "reading")), ["task", "recovery"])
           _ -> (Gave (), ["task", "recovery", "task"])
-
-stale :: Spec
-stale = do
-  for_ operators $ \op ->
-    it ("makes " ++ show op ++ " fail when a reading takes longer, after its branch has ended") $ do
-      book <- newNotebook
-      started <- newGate
-      -- When the reading before the one that hangs was about to end.
-      last' <- newTVarIO 0
-      level <- newSensor $ \_ -> do
-        isStarted <- opened started
-        when isStarted hang
-        now >>= atomically . writeTVar last'
-        pure True
-      let main = (open started >> hang) `onException` note book "main is over"
-          other = note book "other" >> pure "other"
-          signal = Signal.staleAfter 0.005 (sensing level)
-      end <- ending (running op signal main other)
-      over <- now
-      end `shouldBe` FailedWith (tooLong "0.005")
-      since <- readTVarIO last'
-      over - since `shouldSatisfy` (>= 0.005)
-      notes book `shouldReturn` ["main is over"]
-
-  it "fails when there is not even a first reading" $ do
-    book <- newNotebook
-    let signal = Signal.staleAfter 0.001 (Signal.polling 0.001 hang)
-    ending (Signal.rSelect signal (note book "left") (note book "right"))
-      `shouldReturn` FailedWith (tooLong "0.001")
-    notes book `shouldReturn` []
-
-  it "stops the branch in time when the reading cannot be interrupted, and returns after it" $ do
-    book <- newNotebook
-    started <- newGate
-    stopped <- newGate
-    release <- newGate
-    level <- newSensor $ \_ -> do
-      isStarted <- opened started
-      when isStarted . uninterruptibleMask_ $ pass release >> note book "reading is over"
-      pure True
-    let branch = (open started >> hang) `onException` (note book "branch is over" >> open stopped)
-        act =
-          Signal.rSelect (Signal.staleAfter 0.001 (sensing level)) branch branch
-            `onException` note book "operator is over"
-    launching act $ \caller -> do
-      pass stopped
-      stillRunning caller
-      open release
-      awaitEnd caller `shouldReturn` (FailedWith (tooLong "0.001") :: Ending ())
-    notes book `shouldReturn` ["branch is over", "reading is over", "operator is over"]
-
-  it "lets pass readings that are in time" $ do
-    level <- newSensor (pure . (> 20))
-    Signal.waitUntil (Signal.staleAfter 3600 (sensing level))
-
-  it "does not count the time between readings" $
-    -- The reading is instant, the next is far away, and the branch takes longer.
-    Signal.rSelect (Signal.staleAfter 0.001 (Signal.polling (1 / 0) (pure True))) (aWhile 0.001) hang
-
-  it "does not count the time of a recovery" $ do
-    low <- newTVarIO True
-    level <- newSensor (const (readTVarIO low))
-    let recovery = aWhile 0.001 >> atomically (writeTVar low False)
-    Signal.monitor (Signal.staleAfter 0.005 (Signal.polling 0.001 (sensor level))) recovery (pure ())
-
-  it "never fails a signal that is not polled" $ do
-    dial <- newDial True
-    Signal.rSelect (Signal.staleAfter 0.001 (watched dial)) (aWhile 0.001) hang
-
-  it "watches each of several sources" $ do
-    let signal = (&&) <$> Signal.polling 0.001 (pure True) <*> Signal.polling 0.001 hang
-    ending (Signal.waitUntil (Signal.staleAfter 0.005 signal))
-      `shouldReturn` FailedWith (tooLong "0.005")
-
-  for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN")] $ \(limit, shown) ->
-    it ("refuses a limit of " ++ shown ++ ", and nothing starts") $ do
-      book <- newNotebook
-      let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note book "reading"))
-      ending (Signal.rSelect signal (note book "left") (note book "right"))
-        `shouldReturn` FaultedWith ("staleAfter: a period is more than zero seconds, not " ++ shown)
-      notes book `shouldReturn` []
- where
-  tooLong limit = "FailedBecause " ++ show ("no reading of the signal within " ++ limit ++ " s")

@@ -85,6 +85,11 @@ hysteresis = do
     Signal.monitor (Signal.hysteresis 10 90 (dialled level)) cool (pure ())
     notes book `shouldReturn` [95, 65, 35]
 
+  it "decides on the first reading, however long the period" $
+    replicateM_ 200 $
+      Signal.rSelect (Signal.hysteresis 0 1 once) (pure "left") (pure "right")
+        `shouldReturn` "left"
+
   it "refuses thresholds the wrong way round, and nothing starts" $ do
     book <- newNotebook
     let signal = Signal.hysteresis 2 1 (Signal.polling 0.001 ((1 :: Int) <$ note book "reading"))
@@ -95,6 +100,10 @@ hysteresis = do
   thresholds = do
     ~[a, b] <- vectorOf 2 (choose (0, 10 :: Int))
     pure (min a b, max a b)
+
+-- | A sensor that is read but once.
+once :: Signal Int
+once = Signal.polling (1 / 0) (pure 1)
 
 -- | A variable whose signal records who has looked at it.
 data Recorded a = Recorded
@@ -134,6 +143,10 @@ debounce = do
     replicateM_ 200 $
       Signal.rSelect (Signal.debounce (1 / 0) (pure True)) (pure "left") (pure "right")
         `shouldReturn` "left"
+
+  it "decides on the first reading, however long the period" $
+    replicateM_ 200 $
+      Signal.switch (Signal.debounce (1 / 0) once) pure `shouldReturn` 1
 
   it "counts a change once it has lasted for so long, and no sooner" $ do
     dial <- newDial True

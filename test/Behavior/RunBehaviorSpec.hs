@@ -8,6 +8,7 @@ module Behavior.RunBehaviorSpec (spec) where
 import Control.Concurrent
 import Control.Concurrent.Async (wait, waitCatchSTM)
 import Control.Exception
+import Data.Either (fromLeft)
 import Data.Foldable (for_)
 import System.Exit (ExitCode (..))
 import System.IO (hFlush, stdout)
@@ -112,5 +113,5 @@ inChild program = do
     _ <- scheduleAlarm 5
     end <- try program
     -- At once, for the child has nothing to clean up that is not its parent's.
-    exitImmediately (either id (const ExitSuccess) end)
+    exitImmediately (fromLeft ExitSuccess end)
   getProcessStatus True False child >>= maybe (inChild program) pure

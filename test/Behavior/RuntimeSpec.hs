@@ -13,7 +13,7 @@ import Control.Monad (replicateM, void)
 import Data.Foldable (for_, traverse_)
 import Data.Maybe (isNothing)
 #if MIN_VERSION_base(4,18,0)
-import GHC.Conc (threadLabel)
+import GHC.Conc.Sync (threadLabel)
 #endif
 import Test.Hspec
 
@@ -209,7 +209,7 @@ scopes = do
       pass inside
       ask [SomeBranch started]
       open mayEnd
-      pure . pure =<< atomically (outcome started)
+      pure <$> atomically (outcome started)
     told `shouldBe` [False, True]
 
   it "asks nobody twice, however it is asked" $ do

@@ -54,7 +54,8 @@ several :: Spec
 several = do
   prop "a pure one is the function applied to the values" $ \f x y ->
     let g = if f then (+) else (-) :: Int -> Int -> Int
-     in ioProperty $ (=== g x y) <$> Signal.switch (g <$> pure x <*> pure y) pure
+        constant = pure :: Int -> Signal.Signal Int
+     in ioProperty $ (=== g x y) <$> Signal.switch (g <$> constant x <*> constant y) pure
 
   it "has a value when each has one" $ do
     first <- newTVarIO Nothing
@@ -100,7 +101,7 @@ sharing :: Spec
 sharing = do
   prop "withShared s b is b s" $ \c l r ->
     let body n s = Signal.rSelect s (play n l) (play n r)
-     in (\n -> Signal.withShared (pure c) (body n)) `sameAs` (\n -> body n (pure c))
+     in (Signal.withShared (pure c) . body) `sameAs` (\n -> body n (pure c))
 
   it "reads a sensor once for all occurrences, which always agree" $ do
     level <- newSensor pure

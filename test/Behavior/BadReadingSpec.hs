@@ -1,0 +1,228 @@
+-- |
+-- Readings of a polled sensor that go wrong: that fail, hang, cannot be interrupted, or
+-- make trouble when they are; and 'Signal.staleAfter'.
+module Behavior.BadReadingSpec (spec) where
+
+import Control.Concurrent.Async (asyncThreadId)
+import Control.Exception
+import Control.Monad (void, when)
+import Data.Foldable (for_)
+import Data.Maybe (isJust)
+import Test.Hspec
+
+import Behavior.Internal.Runtime (atomically, now)
+import Behavior.Internal.Scope (SomeBranch (..), ask, outcome, structured)
+import Behavior.Internal.Source (startWorkers)
+import qualified Behavior.Internal.Source as Source
+import qualified Behavior.Signal as Signal
+import Support
+import Watched
+
+spec :: Spec
+spec = guarded $ do
+  describe "A reading that" goingWrong
+  describe "staleAfter" stale
+
+goingWrong :: Spec
+goingWrong = do
+  for_ operators $ \op ->
+    for_ faulty $ \(manner, e) ->
+      it (unwords [manner, "ends", show op, "after its branch"]) $ do
+        book <- newNotebook
+        entered <- newGate
+        level <- newSensor $ \_ -> opened entered >>= \isEntered -> if isEntered then throwIO e else pure True
+        let main =
+              (open entered >> hang) `onException` do
+                note book "main is over"
+            other = note book "other" >> pure "other"
+        ending (running op (sensing level) main other `onException` note book "over")
+          `shouldReturn` endingOf (Left e)
+        notes book `shouldReturn` ["main is over", "over"]
+
+  for_ faulty $ \(manner, e) ->
+    it (manner ++ " the first time starts nothing") $ do
+      book <- newNotebook
+      ending (Signal.rSelect (Signal.polling 0.001 (throwIO e)) (note book "l") (note book "r"))
+        `shouldReturn` endingOf (Left e)
+      notes book `shouldReturn` []
+
+  it "swallows the request to stop does not keep the operator from ending" $ do
+    entered <- newGate
+    level <- newSensor $ \_ -> do
+      open entered
+      hang `catch` \e -> pure (null (show (e :: SomeAsyncException)))
+    cancelling (Signal.waitUntil (sensing level)) (pass entered)
+      `shouldReturn` CancelledBy (show (Cancel "the caller"))
+    readings level `shouldReturn` 1
+
+  for_ [minBound .. maxBound] $ \how ->
+    it (unwords ["is stopped because the branch has completed, and then", manners how]) $ do
+      entered <- newGate
+      started <- newGate
+      level <- newSensor $ \_ -> do
+        isStarted <- opened started
+        when isStarted . void $ onStop how "reading" (open entered >> hang)
+        pure True
+      end <- ending (Signal.rSelect (sensing level) (open started >> pass entered) (pure ()))
+      end `shouldBe` case how of
+        Faulting -> FaultedWith (show (Fault "reading"))
+        _ -> Gave ()
+
+  for_ [minBound .. maxBound] $ \how ->
+    it (unwords ["is stopped because the caller is cancelled, and then", manners how]) $ do
+      entered <- newGate
+      level <- newSensor $ \_ -> True <$ onStop how "reading" (open entered >> hang)
+      end <- cancelling (leavingNothing (Signal.waitUntil (sensing level))) (pass entered)
+      end `shouldBe` case how of
+        Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "reading"))
+        _ -> CancelledBy (show (Cancel "the caller"))
+
+  it "cannot be interrupted has ended before its operator" $ do
+    book <- newNotebook
+    started <- newGate
+    entered <- newGate
+    release <- newGate
+    level <- newSensor $ \_ -> do
+      isStarted <- opened started
+      when isStarted . uninterruptibleMask_ $ do
+        open entered
+        pass release
+        note book "reading is over"
+      pure True
+    let act = do
+          Signal.rSelect (sensing level) (open started >> pass entered >> note book "branch is over") (pure ())
+          note book "operator is over"
+    launching act $ \caller -> do
+      eventually ((== ["branch is over"]) <$> notes book)
+      awaitUnheard (asyncThreadId caller)
+      open release
+      awaitEnd caller `shouldReturn` Gave ()
+    notes book `shouldReturn` ["branch is over", "reading is over", "operator is over"]
+
+  for_ ["reading", "branch"] $ \deaf ->
+    it ("has to stop hears it at once, with the branch, though the " ++ deaf ++ " is deaf") $ do
+      started <- newGate
+      readingEntered <- newGate
+      heard <- newGate
+      release <- newGate
+      let being name entered
+            | name == deaf = uninterruptibleMask_ (open entered >> pass release)
+            | otherwise = (open entered >> hang) `onException` open heard
+      level <- newSensor $ \_ -> do
+        isStarted <- opened started
+        when isStarted (being "reading" readingEntered)
+        pure True
+      let act = Signal.rSelect (sensing level) (being "branch" started) (pure ())
+      launching act $ \caller -> do
+        pass readingEntered
+        throwing (asyncThreadId caller) (Cancel "the caller")
+        -- It is the other one that hears, while the deaf one still waits.
+        pass heard
+        open release
+        awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "the caller"))
+ where
+  faulty =
+    [ ("fails", toException (Failure "no echo"))
+    , ("faults", toException (Fault "no echo"))
+    , ("throws a cancellation", toException (Cancel "no echo"))
+    ]
+  manners how = case how of
+    Cleanly -> "stops"
+    Completing -> "returns all the same"
+    Failing -> "fails: which nobody minds"
+    Faulting -> "faults: which gets out"
+
+stale :: Spec
+stale = do
+  for_ operators $ \op ->
+    it ("makes " ++ show op ++ " fail when a reading takes longer, after its branch has ended") $ do
+      book <- newNotebook
+      started <- newGate
+      level <- newSensor $ \_ -> opened started >>= \isStarted -> if isStarted then hang else pure True
+      let main = (open started >> hang) `onException` note book "main is over"
+          other = note book "other" >> pure "other"
+          signal = Signal.staleAfter 0.005 (sensing level)
+      since <- now
+      ending (running op signal main other) `shouldReturn` FailedWith (tooLong "0.005")
+      over <- now
+      over - since `shouldSatisfy` (>= 0.005)
+      -- (Should the machine take longer than that for a reading which does nothing, then
+      -- there was no branch.)
+      ran <- opened started
+      notes book `shouldReturn` ["main is over" | ran]
+
+  it "fails when there is not even a first reading" $ do
+    book <- newNotebook
+    let signal = Signal.staleAfter 0.001 (Signal.polling 0.001 hang)
+    ending (Signal.rSelect signal (note book "left") (note book "right"))
+      `shouldReturn` FailedWith (tooLong "0.001")
+    notes book `shouldReturn` []
+
+  it "stops the branch in time when the reading cannot be interrupted, and returns after it" $ do
+    book <- newNotebook
+    started <- newGate
+    stopped <- newGate
+    release <- newGate
+    level <- newSensor $ \_ -> do
+      isStarted <- opened started
+      when isStarted . uninterruptibleMask_ $ pass release >> note book "reading is over"
+      pure True
+    let branch = (open started >> hang) `onException` (note book "branch is over" >> open stopped)
+        act =
+          Signal.rSelect (Signal.staleAfter 0.005 (sensing level)) branch branch
+            `onException` (note book "operator is over" >> open stopped)
+    launching act $ \caller -> do
+      pass stopped
+      open release
+      awaitEnd caller `shouldReturn` (FailedWith (tooLong "0.005") :: Ending ())
+    -- (Again, if the machine is too slow there was no branch.)
+    ran <- opened started
+    notes book `shouldReturn` ["branch is over" | ran] ++ ["reading is over" | ran] ++ ["operator is over"]
+
+  it "lets pass readings that are in time" $ do
+    level <- newSensor (pure . (> 20))
+    Signal.waitUntil (Signal.staleAfter 3600 (sensing level))
+
+  -- Seen from inside: when the reading began that it knows of.
+  it "does not count the time between readings" $ do
+    source <- Source.open (Signal.polling (1 / 0) (pure ()))
+    atomically (Source.reading source) `shouldReturn` Nothing
+    structured $ \scope -> do
+      (seen, _) <- startWorkers scope "test" source
+      atomically (Source.look seen Source.First)
+      atomically (Source.reading source) `shouldReturn` Nothing
+      pure (pure ())
+
+  it "does not count the time of a recovery, when it was stopped in the middle of a reading" $ do
+    entered <- newGate
+    level <- newSensor $ \n -> when (n == 1) (open entered >> hang)
+    source <- Source.open (sensing level)
+    structured $ \scope -> do
+      (_, workers) <- startWorkers scope "test" source
+      pass entered
+      began <- atomically (Source.reading source)
+      began `shouldSatisfy` isJust
+      ask (map SomeBranch workers)
+      for_ workers (atomically . outcome)
+      _ <- startWorkers scope "test" source
+      atomically (Source.reading source) >>= (`shouldSatisfy` (/= began))
+      pure (pure ())
+
+  it "never fails a signal that is not polled" $ do
+    dial <- newDial True
+    Signal.rSelect (Signal.staleAfter 0.001 (watched dial)) (aWhile 0.001) hang
+
+  it "watches each of several sources" $ do
+    let signal = (&&) <$> Signal.polling 0.001 (pure True) <*> Signal.polling 0.001 hang
+    ending (Signal.waitUntil (Signal.staleAfter 0.005 signal))
+      `shouldReturn` FailedWith (tooLong "0.005")
+
+  for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN")] $ \(limit, shown) ->
+    it ("refuses a limit of " ++ shown ++ ", and nothing starts") $ do
+      book <- newNotebook
+      let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note book "reading"))
+      ending (Signal.rSelect signal (note book "left") (note book "right"))
+        `shouldReturn` FaultedWith ("staleAfter: a period is more than zero seconds, not " ++ shown)
+      notes book `shouldReturn` []
+ where
+  tooLong limit = "FailedBecause " ++ show ("no reading of the signal within " ++ limit ++ " s")
