@@ -89,6 +89,6 @@ module Behavior
 import Behavior.Internal.Failure
 import Behavior.Internal.Parallel
 import Behavior.Internal.Polled
+import Behavior.Internal.Program
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
-import Behavior.Internal.Time

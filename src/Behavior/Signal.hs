@@ -40,5 +40,7 @@ module Behavior.Signal
   , whileHolding
   ) where
 
+import Behavior.Internal.Filter
 import Behavior.Internal.Reactive
+import Behavior.Internal.Sensor
 import Behavior.Internal.Source

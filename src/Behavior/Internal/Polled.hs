@@ -10,7 +10,7 @@ module Behavior.Internal.Polled
 import Behavior.Internal.Failure (Behavior)
 import qualified Behavior.Internal.Reactive as Signal
 import Behavior.Internal.Runtime (Seconds)
-import qualified Behavior.Internal.Source as Signal
+import qualified Behavior.Internal.Sensor as Signal
 
 -- | A reactive @if@: reads @test@ again and again, runs @left@ while it is true and
 -- @right@ while it is false, and switches whenever it changes.

@@ -1,0 +1,104 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- Signals that do not follow every flicker.
+module Behavior.Internal.Filter
+  ( debounce
+  , hysteresis
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception (ErrorCall (..), SomeException, throwIO)
+import Control.Monad (forever, when)
+
+import Behavior.Internal.Runtime
+import Behavior.Internal.Source
+
+-- $setup
+-- >>> import Behavior
+-- >>> import qualified Behavior.Signal as Signal
+
+-- | A change counts only once it has lasted for so many seconds (zero or more);
+-- until then the signal keeps its value. Its first value counts at once, and so
+-- does the first after a time when nobody watched (as during a recovery).
+--
+-- >>> Signal.waitUntil (Signal.debounce 0.5 (pure True))
+--
+-- @since 0.1.0.0
+debounce :: Eq a => Seconds -> Signal a -> Signal a
+debounce seconds signal = Signal $ do
+  _ <- duration "debounce" seconds
+  source <- open signal
+  settled <- newTVarIO Nothing
+  pending <- newTVarIO Nothing -- a value that differs, and since when
+  let noticing value = do
+        first <- atomically value
+        atomically (writeTVar settled (Just first))
+        let next old = do
+              new <- atomically (value >>= \v -> check (v /= old) >> pure v)
+              t <- now
+              atomically $ do
+                isSettled <- (== Just new) <$> readTVar settled
+                writeTVar pending (if isSettled then Nothing else Just (new, t))
+              next new
+        next first
+      settling = forever $ do
+        candidate@(new, since) <- atomically (readTVar pending >>= maybe retry pure)
+        sleepUntil (since + seconds)
+        atomically $ do
+          lasted <- (== Just candidate) <$> readTVar pending
+          when lasted (writeTVar settled (Just new) >> writeTVar pending Nothing)
+      forgetAll = writeTVar settled Nothing >> writeTVar pending Nothing
+  pure
+    source
+      { workers =
+          workers source
+            ++ [ Worker "debounce" (forgetAll >> const . noticing . quietly <$> view source)
+               , Worker "debounce clock" (pure (const settling))
+               ]
+      , -- The look at the source itself is for what it throws.
+        view = looking (*> (readTVar settled >>= maybe retry pure)) <$> view source
+      }
+
+-- | @hysteresis low high signal@ becomes true when the signal reaches @high@, and
+-- false when it falls to @low@; in between it keeps its value, which at first is
+-- false. (A Schmitt trigger.) That memory lasts for the operator's whole run,
+-- across recoveries.
+--
+-- @low@ must not be above @high@ (an 'ErrorCall' says so).
+--
+-- >>> let level = pure 50 :: Signal Int
+-- >>> let charged = Signal.hysteresis 10 90 level
+-- >>> Signal.rSelect charged (pure "work") (pure "charge")
+-- "charge"
+--
+-- @since 0.1.0.0
+hysteresis :: Ord a => a -> a -> Signal a -> Signal Bool
+hysteresis low high signal = Signal $ do
+  when (low > high) . throwIO . ErrorCall $
+    "hysteresis: the lower threshold must not be above the upper one"
+  source <- open signal
+  memory <- newTVarIO False
+  let state value = do
+        v <- value
+        before <- readTVar memory
+        let after = v >= high || (before && v > low)
+        when (after /= before) (writeTVar memory after)
+        pure after
+      -- What a look finds out is remembered if the operator acts on it, in the same
+      -- transaction, and is undone if the operator goes on waiting. Then this
+      -- remembers it.
+      remembering value = forever . atomically $ do
+        before <- readTVar memory
+        after <- state value
+        check (after /= before)
+  pure
+    source
+      { workers = workers source ++ [Worker "hysteresis" (const . remembering . quietly <$> view source)]
+      , view = looking state <$> view source
+      }
+
+-- | A look for those who wait for values only: what it throws is for the operator,
+-- which looks for itself.
+quietly :: View a -> STM a
+quietly v = look v First `catchSTM` \(_ :: SomeException) -> retry
