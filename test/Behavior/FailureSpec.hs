@@ -103,6 +103,9 @@ fallbacks = do
     observing (\notebook -> pure () ? note notebook 'l' >> note notebook 'r')
       `shouldReturn` (Gave (), "r")
 
+  it "nests to the right, or it could not be mixed with an operator that does" $
+    (failed ? failed |?| pure 'c') `shouldReturn` 'c'
+
   it "catches a failure of every type" $
     for_ [throwIO (Failure "locked"), failed, failWith "stuck", throwIO (TimedOut 1)] $ \failure ->
       (failure ? pure "recovered") `shouldReturn` "recovered"
@@ -303,6 +306,12 @@ inCallersState which place =
     place getMaskingState `shouldReturn` Unmasked
     mask_ (place getMaskingState) `shouldReturn` MaskedInterruptible
     uninterruptibleMask_ (place getMaskingState) `shouldReturn` MaskedUninterruptible
+
+-- | Another name for '?'.
+(|?|) :: IO a -> IO a -> IO a
+(|?|) = fallback
+
+infixr 3 |?|
 
 -- | What a behaviour does when it is run for the first time, the second time...
 newtype Scripts = Scripts [Script]

@@ -542,6 +542,17 @@ nurseries = do
       )
       `shouldReturn` 'a'
 
+  it "lets a cleanup fork, when all is being stopped: it does not wait, and nothing runs" $ do
+    inside <- newGate
+    (end, done) <- observing $ \notebook ->
+      scoped
+        ( \nursery ->
+            (open inside >> hang)
+              `onException` (fork nursery (note notebook "forked") >> note notebook "went on")
+        )
+        ||| pass inside
+    (end, done) `shouldBe` (Gave (), ["went on"])
+
   it "throws the failure of what was forked also if the scoped behaviour is just forking" $
     for_ [1 .. 300] $ \n -> do
       end <- ending . scoped $ \nursery -> do

@@ -11,6 +11,7 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (replicateM_, unless, void, when)
 import Data.Foldable (for_)
+import Data.List (group)
 import Test.Hspec hiding (after, before)
 
 import Behavior (Behavior, Seconds)
@@ -189,7 +190,7 @@ counting = do
     reportingTo (note events) (Signal.waitUntil (sensing level))
     notes events
       `shouldReturn` [f (Label "waitUntil" "polling") | f <- [Started, Ended]]
-    notes threads >>= (`shouldSatisfy` \(one : others) -> all (== one) others)
+    notes threads >>= (`shouldSatisfy` (== 1) . length . group)
 
 -- | A monitor that has a polled sensor and an alarm, which alone decides; whose task
 -- is under way, and whose sensor is just being read, once the gate is open. From then

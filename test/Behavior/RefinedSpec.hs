@@ -14,7 +14,7 @@ import Data.IORef (atomicModifyIORef', newIORef, readIORef)
 import GHC.Conc (unsafeIOToSTM)
 import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
-import Test.QuickCheck (choose, forAll, ioProperty, listOf1, vectorOf, (===))
+import Test.QuickCheck (choose, forAll, ioProperty, listOf1, (===))
 
 import Behavior (Seconds)
 import Behavior.Internal.Runtime (atomically, now)
@@ -44,7 +44,7 @@ hysteresis = do
                 hang
         Signal.switch signal branch
         let next state value = value >= high || (state && value > low)
-        (tail (scanl next False levels) ===) <$> notes book
+        (drop 1 (scanl next False levels) ===) <$> notes book
 
   it "remembers what its operator has acted on, before any other value can be seen" $
     replicateM_ 200 $ do
@@ -98,7 +98,8 @@ hysteresis = do
     notes book `shouldReturn` []
  where
   thresholds = do
-    ~[a, b] <- vectorOf 2 (choose (0, 10 :: Int))
+    a <- choose (0, 10 :: Int)
+    b <- choose (0, 10)
     pure (min a b, max a b)
 
 -- | A sensor that is read but once.
@@ -223,7 +224,7 @@ flickering lasting values = do
     end <- awaitEnd caller
     over <- now
     case end of
-      Gave (value, t) -> pure (value, t, zipWith until' phases (map noticedAt (tail phases) ++ [over]))
+      Gave (value, t) -> pure (value, t, zipWith until' phases (map noticedAt (drop 1 phases) ++ [over]))
       _ -> throwIO (userError ("it ended with " ++ show end))
  where
   noticedAt (_, _, t) = t

@@ -151,8 +151,17 @@ alarming act trouble = act `onException` atomically (writeTVar trouble True)
 -- | A place where behaviours run beside a 'scoped' one.
 --
 -- @since 0.1.0.0
-newtype Nursery = Nursery (TVar (Maybe [Request]))
--- ^ What is to be forked next, the newest first; nothing once 'scoped' has ended.
+newtype Nursery = Nursery (TVar Stage)
+
+-- | How far a nursery has come.
+data Stage
+  = -- | What is to be forked next, the newest first.
+    Open [Request]
+  | -- | All is being stopped. Some may just be forking, in a cleanup even: what they
+    -- fork is taken for stopped before it began.
+    Ending
+  | -- | All has ended.
+    Closed
 
 -- | A behaviour to fork, and where to say that it was started.
 data Request = Request (Behavior ()) (TMVar ())
@@ -179,10 +188,9 @@ data Request = Request (Behavior ()) (TMVar ())
 -- @since 0.1.0.0
 scoped :: (Nursery -> Behavior a) -> Behavior a
 scoped body = do
-  requests <- newTVarIO (Just [])
-  -- It closes only when all have ended: of those who are still being stopped, some
-  -- may just be forking.
-  structured (serving requests) `finally` atomically (writeTVar requests Nothing)
+  requests <- newTVarIO (Open [])
+  structured (\scope -> serving requests scope `finally` atomically (writeTVar requests Ending))
+    `finally` atomically (writeTVar requests Closed)
  where
   serving requests scope = do
     trouble <- newTVarIO False
@@ -202,7 +210,7 @@ scoped body = do
           alarm = readTVar trouble >>= check >> throwIO <$> asum (uncompleted <$> reverse children)
         arrived =
           readTVar requests >>= \case
-            Just new@(_ : _) -> reverse new <$ writeTVar requests (Just [])
+            Open new@(_ : _) -> reverse new <$ writeTVar requests (Open [])
             _ -> retry
         alive child = do
           over <- atomically ((True <$ completed child) `orElse` pure False)
@@ -212,7 +220,9 @@ scoped body = do
 -- | Starts a behaviour that runs until it ends by itself, or 'scoped' ends. The
 -- transaction that it returns waits for the result.
 --
--- Outside its 'scoped' the nursery is closed: an 'ErrorCall' (a fault) says so.
+-- While all is being stopped (in a cleanup, say) nothing is started any more, and the
+-- result never comes. Outside its 'scoped' the nursery is closed: an 'ErrorCall' (a
+-- fault) says so.
 --
 -- @since 0.1.0.0
 fork :: Nursery -> Behavior a -> Behavior (STM a)
@@ -220,10 +230,12 @@ fork (Nursery requests) act = do
   answer <- newEmptyTMVarIO
   accepted <- newEmptyTMVarIO
   let request = Request (act >>= atomically . putTMVar answer) accepted
-  atomically $ open >>= writeTVar requests . Just . (request :)
-  atomically $ takeTMVar accepted `orElse` (open >> retry)
+  atomically $ ifOpen (writeTVar requests . Open . (request :))
+  atomically $ takeTMVar accepted `orElse` ifOpen (const retry)
   pure (readTMVar answer)
  where
-  open =
-    readTVar requests
-      >>= maybe (throwSTM (ErrorCall "fork: the nursery's scoped behaviour has ended")) pure
+  ifOpen further =
+    readTVar requests >>= \case
+      Open waiting -> further waiting
+      Ending -> pure ()
+      Closed -> throwSTM (ErrorCall "fork: the nursery's scoped behaviour has ended")
