@@ -414,7 +414,7 @@ groups =
   , ("both", 2, foldr1 both)
   , ("firstOf", 4, firstOf)
   , ("allOf", 4, void . allOf)
-  , ("scoped", 4, \acts -> scoped $ \nursery -> traverse_ (fork nursery) (tail acts) >> head acts)
+  , ("scoped", 4, \acts -> scoped $ \nursery -> traverse_ (fork nursery) (drop 1 acts) >> sequence_ (take 1 acts))
   ]
 
 together :: Spec
@@ -447,10 +447,10 @@ together = do
     it (operator ++ ": hears of it at once when one of them ends the operator") $ do
       inside <- replicateM size newGate
       heard <- replicateM size newGate
-      let act 0 = traverse_ pass (tail inside) >> failed
+      let act 0 = traverse_ pass (drop 1 inside) >> failed
           act n =
             uninterruptibly (open (inside !! n) >> hang) $
-              open (heard !! n) >> traverse_ pass (tail heard)
+              open (heard !! n) >> traverse_ pass (drop 1 heard)
       ending (apply' (map act [0 .. size - 1])) `shouldReturn` FailedWith (show Failed)
 
 -- scoped and fork -------------------------------------------------------------

@@ -260,7 +260,7 @@ scopes = do
             pass inside
             pure (failed :: IO ())
           -- The handler of a failure would be run, and interrupted.
-          handled = operator `catch` \Failed -> note notebook "handler"
+          handled = operator `catch` \(_ :: Failed) -> note notebook "handler"
       launching handled $ \caller -> do
         pass cleaning
         throwing (asyncThreadId caller) (Cancel "caller")

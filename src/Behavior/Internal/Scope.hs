@@ -39,7 +39,7 @@ import Control.Concurrent (ThreadId)
 import Control.Concurrent.STM (STM, orElse, retry)
 import Control.Exception
   ( Exception (..)
-  , SomeException
+  , SomeException (..)
   , asyncExceptionFromException
   , asyncExceptionToException
   , mask
@@ -235,5 +235,5 @@ instance Show StoppedWithFault where
 instance Exception StoppedWithFault where
   toException = asyncExceptionToException
   fromException = asyncExceptionFromException
-  displayException (StoppedWithFault cause fault) =
+  displayException (StoppedWithFault (SomeException cause) (SomeException fault)) =
     "stopped by " ++ displayException cause ++ ", and while stopping: " ++ displayException fault

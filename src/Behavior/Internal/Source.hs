@@ -135,8 +135,9 @@ watching transaction = Signal . pure $ (pure ()) {view = pure (View value)}
 --
 -- > withShared s body  ~  body s     but with one thread a sensor, not one an occurrence
 --
--- The sensors are read for as long as the behaviour runs. All that the behaviour
--- throws is thrown. Outside it the shared signal is closed: to open it there is a
+-- The sensors are read for as long as the behaviour runs, and are asked to stop
+-- together with it: a cleanup must not wait for them. All that the behaviour throws is
+-- thrown. Outside it the shared signal is closed: to open it there is a
 -- fault, an 'ErrorCall'.
 --
 -- >>> import Data.IORef
