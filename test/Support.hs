@@ -77,10 +77,11 @@ import Behavior
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime (atomically, living)
 
--- | Every spec as a whole goes in here: each example must be over within ten
--- seconds, and must leave no thread of the library running.
+-- | Every spec as a whole goes in here: each example must be over within twenty
+-- seconds (of which it needs one at the most, unless the machine is very busy), and
+-- must leave no thread of the library running.
 guarded :: Spec -> Spec
-guarded = around_ (within 10 . leavingNothing)
+guarded = around_ (within 20 . leavingNothing)
 
 -- | Fails when the action takes more than so many (real) seconds, also when it
 -- cannot be interrupted: then its thread is left behind.

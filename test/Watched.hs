@@ -23,6 +23,12 @@ module Watched
   , readingsBeyond
   , aWhile
 
+    -- * Who looks
+  , Recorded (..)
+  , newRecorded
+  , noticed
+  , hasNoticed
+
     -- * Branches
   , Stopping (..)
   , onStop
@@ -42,11 +48,13 @@ module Watched
   , operators
   ) where
 
-import Control.Concurrent (ThreadId)
+import Control.Concurrent (ThreadId, myThreadId)
+import Control.Concurrent.Async (Async, asyncThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (void)
-import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
+import Data.IORef (atomicModifyIORef', newIORef, readIORef)
+import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus, unsafeIOToSTM)
 
 import Behavior (Behavior, Seconds, failWith)
 import Behavior.Internal.Runtime (atomically)
@@ -118,6 +126,38 @@ aWhile :: Seconds -> Behavior ()
 aWhile every = do
   own <- newSensor (pure . (> 20))
   Signal.waitUntil (Signal.polling every (sensor own))
+
+-- | A variable whose signal records who has looked at it.
+data Recorded a = Recorded
+  { underlying :: TVar a
+  , recorded :: Signal a
+  , looks :: (ThreadId -> Bool) -> a -> IO Int
+  -- ^ How often the threads that are meant have looked at it since it has this value.
+  }
+
+newRecorded :: Eq a => a -> IO (Recorded a)
+newRecorded initial = do
+  var <- newTVarIO initial
+  seen <- newIORef []
+  pure
+    Recorded
+      { underlying = var
+      , recorded = Signal.watching $ do
+          value <- readTVar var
+          unsafeIOToSTM $ do
+            self <- myThreadId
+            value <$ atomicModifyIORef' seen (\all' -> ((self, value) : all', ()))
+      , looks = \meant value ->
+          length . takeWhile ((== value) . snd) . filter (meant . fst) <$> readIORef seen
+      }
+
+-- | Waits until a worker of the operator that the caller runs has seen the value and
+-- done what there is to do: it looks for the second time.
+noticed :: Recorded a -> Async b -> a -> IO ()
+noticed var caller = eventually . hasNoticed var caller
+
+hasNoticed :: Recorded a -> Async b -> a -> IO Bool
+hasNoticed var caller value = (>= 2) <$> looks var (/= asyncThreadId caller) value
 
 -- | What a branch does when it is asked to stop.
 data Stopping = Cleanly | Completing | Failing | Faulting

@@ -3,14 +3,15 @@
 -- when several things happen is in "Behavior.OutcomeSpec".
 module Behavior.OperatorsSpec (spec) where
 
+import Control.Concurrent (yield)
 import Control.Concurrent.Async (asyncThreadId)
-import Control.Concurrent.STM (newTVarIO)
+import Control.Concurrent.STM (modifyTVar', newTVarIO)
 import Control.Exception
-import Control.Monad (void, when)
+import Control.Monad (replicateM_, void, when)
 import Data.Foldable (for_)
 import Test.Hspec
 
-import Behavior.Internal.Runtime (Event (..), Label (..), reportingTo)
+import Behavior.Internal.Runtime (Event (..), Label (..), atomically, reportingTo)
 import Support
 import Watched
 
@@ -77,6 +78,23 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
       open release
       awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "once"))
     notes book `shouldReturn` ["main is over", "operator is over"]
+
+  it "can be cancelled at any moment" $
+    -- With the next one the caller is a little further on, or not.
+    replicateM_ 500 $ do
+      let act = leavingNothing (running op (pure True) hang hang)
+      cancelling act (pure ()) `shouldReturn` CancelledBy (show (Cancel "the caller"))
+
+  it "does not look again while nothing changes that it looks at" $ do
+    dial <- newRecorded True
+    other <- newTVarIO (0 :: Int)
+    entered <- newGate
+    launching (running op (recorded dial) (open entered >> hang) hang) $ \caller -> do
+      pass entered
+      awaitIdle (asyncThreadId caller)
+      earlier <- looks dial (const True) True
+      replicateM_ 1000 (atomically (modifyTVar' other (+ 1)) >> yield)
+      looks dial (const True) True `shouldReturn` earlier
 
   for_ [1 .. 3] $ \level -> do
     it ("nested in itself three times, is stopped at level " ++ show level) $ do

@@ -243,12 +243,12 @@ ties = do
  where
   mostly operator left right end = onOneCapability $ do
     ends <- replicateM 50 $ do
-      inside <- replicateM 2 newEmptyMVar
+      leftThere <- newEmptyMVar
+      rightThere <- newEmptyMVar
       cue <- newGate
       let act there final = myThreadId >>= putMVar there >> pass cue >> final
-          [left', right'] = zipWith act inside [left, right]
-      launching (operator left' right') $ \caller -> do
-        traverse readMVar inside >>= traverse_ awaitIdle
+      launching (operator (act leftThere left) (act rightThere right)) $ \caller -> do
+        traverse readMVar [leftThere, rightThere] >>= traverse_ awaitIdle
         awaitIdle (asyncThreadId caller)
         open cue
         awaitEnd caller

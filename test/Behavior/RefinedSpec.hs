@@ -4,14 +4,11 @@
 -- Signals made more exact: 'Signal.hysteresis' and 'Signal.debounce'.
 module Behavior.RefinedSpec (spec) where
 
-import Control.Concurrent (ThreadId, myThreadId)
-import Control.Concurrent.Async (Async, asyncThreadId)
+import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (throwIO)
 import Control.Monad (replicateM_, unless)
 import Data.Foldable (for_)
-import Data.IORef (atomicModifyIORef', newIORef, readIORef)
-import GHC.Conc (unsafeIOToSTM)
 import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (choose, forAll, ioProperty, listOf1, (===))
@@ -51,7 +48,7 @@ hysteresis = do
       level <- newRecorded (95 :: Int)
       self <- myThreadId
       let left = do
-            atomically (writeTVar (variable level) 50)
+            atomically (writeTVar (underlying level) 50)
             eventually ((>= 1) <$> looks level (== self) 50)
             pure "left"
       Signal.rSelect (Signal.hysteresis 10 90 (recorded level)) left (pure "right")
@@ -63,16 +60,16 @@ hysteresis = do
     armed <- newTVarIO False
     entered <- newGate
     let signal = (&&) <$> dialled armed <*> Signal.hysteresis 10 90 (recorded level)
-        cool = note book "cool" >> atomically (writeTVar (variable level) 10)
+        cool = note book "cool" >> atomically (writeTVar (underlying level) 10)
         task = do
           note book "task"
           again <- (> 1) . length <$> notes book
           unless again (open entered >> hang)
     launching (Signal.monitor signal cool task) $ \caller -> do
       pass entered
-      atomically (writeTVar (variable level) 95)
+      atomically (writeTVar (underlying level) 95)
       noticed level caller 95
-      atomically (writeTVar (variable level) 50 >> writeTVar armed True)
+      atomically (writeTVar (underlying level) 50 >> writeTVar armed True)
       awaitEnd caller `shouldReturn` Gave ()
     notes book `shouldReturn` ["task", "cool", "task"]
 
@@ -105,38 +102,6 @@ hysteresis = do
 -- | A sensor that is read but once.
 once :: Signal Int
 once = Signal.polling (1 / 0) (pure 1)
-
--- | A variable whose signal records who has looked at it.
-data Recorded a = Recorded
-  { variable :: TVar a
-  , recorded :: Signal a
-  , looks :: (ThreadId -> Bool) -> a -> IO Int
-  -- ^ How often the threads that are meant have looked at it since it has this value.
-  }
-
-newRecorded :: Eq a => a -> IO (Recorded a)
-newRecorded initial = do
-  var <- newTVarIO initial
-  seen <- newIORef []
-  pure
-    Recorded
-      { variable = var
-      , recorded = Signal.watching $ do
-          value <- readTVar var
-          unsafeIOToSTM $ do
-            self <- myThreadId
-            value <$ atomicModifyIORef' seen (\all' -> ((self, value) : all', ()))
-      , looks = \meant value ->
-          length . takeWhile ((== value) . snd) . filter (meant . fst) <$> readIORef seen
-      }
-
--- | Waits until a worker of the operator that the caller runs has seen the value and
--- done what there is to do: it looks for the second time.
-noticed :: Recorded a -> Async b -> a -> IO ()
-noticed var caller = eventually . hasNoticed var caller
-
-hasNoticed :: Recorded a -> Async b -> a -> IO Bool
-hasNoticed var caller value = (>= 2) <$> looks var (/= asyncThreadId caller) value
 
 debounce :: Spec
 debounce = do
@@ -210,7 +175,7 @@ flickering lasting values = do
     begin <- now
     let setting value = do
           from <- now
-          atomically (writeTVar (variable level) value)
+          atomically (writeTVar (underlying level) value)
           eventually $ (||) <$> opened counted <*> hasNoticed level caller value
           (,,) value from <$> now
         flicker phases = \case

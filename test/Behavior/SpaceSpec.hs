@@ -36,9 +36,9 @@ spec = guarded . describe "In constant memory run" $ do
             if n == 1000000 then pure () else (step >> throwIO (Failure "again")) ? again
       again
 
-  it "fifty thousand operators with branches, one after the other" $
-    inConstantMemory 50000 $ \step ->
-      replicateM_ 10000 $ do
+  it "twenty thousand operators with branches, one after the other" $
+    inConstantMemory 20000 $ \step ->
+      replicateM_ 4000 $ do
         step >> parallel (pure ()) hang
         step >> both (pure ()) (pure ())
         step >> firstOf [pure (), hang, hang]

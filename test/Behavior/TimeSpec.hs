@@ -14,7 +14,7 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (duration, period, sleepUntil)
+import Behavior.Internal.Runtime (Event (..), Label (..), duration, period, reportingTo, sleepUntil)
 import Behavior.Time
 import Support
 
@@ -155,6 +155,11 @@ timeouts = do
     var <- newTVarIO 'a'
     timeout 3600 (atomically (writeTVar var 'b'))
     atomically (readTVar var) `shouldReturn` 'b'
+
+  it "labels its two threads, the branch and the clock" $ do
+    (_, events) <- observing $ \notebook -> reportingTo (note notebook) (timeout 3600 (pure ()))
+    [started | Started started <- events]
+      `shouldMatchList` [Label "timeout" "branch", Label "timeout" "clock"]
 
   it "runs the behaviour in a thread of its own" $ do
     caller <- myThreadId
