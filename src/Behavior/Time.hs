@@ -13,6 +13,7 @@ module Behavior.Time
     -- * Waiting
   , sleep
   , atomically
+  , checkpoint
 
     -- * Limits
   , timeout

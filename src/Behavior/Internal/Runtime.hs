@@ -1,11 +1,12 @@
-{-# LANGUAGE GeneralizedNewtypeDeriving #-}
+{-# LANGUAGE RankNTypes #-}
 
 -- |
 -- The seam: all that the library does with threads, time and waiting goes through
 -- this module. No other module forks, delays, throws to a thread or waits in a
--- transaction, so whoever stands here sees, and may one day simulate, everything.
+-- transaction, so a simulation that takes over here has taken over everything.
 --
--- While nobody watches, what the seam adds is one read of a global reference.
+-- Each operation is done in reality, or in the simulation that the calling thread
+-- is part of ("Behavior.Internal.Seam").
 module Behavior.Internal.Runtime
   ( -- * Threads
     Label (..)
@@ -30,6 +31,7 @@ module Behavior.Internal.Runtime
 
     -- * Watching
   , Event (..)
+  , note
   , reportingTo
   ) where
 
@@ -40,7 +42,7 @@ import qualified Control.Concurrent.STM as STM
 import Control.Exception
   ( BlockedIndefinitelyOnSTM (..)
   , ErrorCall (..)
-  , Exception
+  , Exception (toException)
   , SomeException
   , bracket_
   , throwIO
@@ -52,18 +54,9 @@ import Data.Foldable (for_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
 import GHC.Clock (getMonotonicTime)
 import GHC.Conc (labelThread)
-import Numeric (showFFloat)
 import System.IO.Unsafe (unsafePerformIO)
 
--- | Who started a thread, and what runs in it: @Label "monitor" "task"@.
-data Label = Label
-  { labelOperator :: String
-  , labelBranch :: String
-  }
-  deriving (Eq, Ord)
-
-instance Show Label where
-  show (Label operator branch) = operator ++ ": " ++ branch
+import Behavior.Internal.Seam
 
 -- | A thread that the library has started, and how it ends.
 data Thread a = Thread
@@ -77,32 +70,47 @@ data Thread a = Thread
 start :: Label -> IO a -> IO (Thread a)
 start label act = do
   modifyLiving 1
-  -- Forked masked: an exception cannot strike before 'try' is in place, nor
-  -- between the end of the action and the publication of how it ended.
-  thread <- asyncWithUnmask $ \unmask -> do
-    self <- myThreadId
-    labelThread self (show label)
-    report (Started label)
-    end <- try (unmask act)
-    report (Ended label)
-    modifyLiving (-1)
-    pure end
-  pure
-    Thread
-      { threadId = asyncThreadId thread
-      , threadEnd = join <$> waitCatchSTM thread
-      }
+  inSimulation really $ \simulation -> do
+    end <- STM.newEmptyTMVarIO
+    thread <- spawn simulation label (life label act) (STM.putTMVar end)
+    pure Thread {threadId = thread, threadEnd = STM.readTMVar end}
+ where
+  really = do
+    -- Forked masked: an exception cannot strike before 'try' is in place, nor
+    -- between the end of the action and the publication of how it ended.
+    thread <- asyncWithUnmask (life label act (pure ()))
+    pure
+      Thread
+        { threadId = asyncThreadId thread
+        , threadEnd = join <$> waitCatchSTM thread
+        }
+
+-- | What a thread does, and how the action ended. It begins by what is given.
+life :: Label -> IO a -> IO () -> (forall b. IO b -> IO b) -> IO (Either SomeException a)
+life label act begin unmask = do
+  self <- myThreadId
+  labelThread self (show label)
+  report (Started label)
+  end <- try (unmask (begin >> act))
+  report (Ended label)
+  modifyLiving (-1)
+  pure end
 
 -- | Throws an exception to a thread, and returns, uninterruptibly, when that has
 -- heard it or has ended. A thread in an uninterruptible cleanup is slow to hear.
 interrupt :: Exception e => ThreadId -> e -> IO ()
-interrupt thread e = uninterruptibleMask_ (throwTo thread e)
+interrupt thread e =
+  uninterruptibleMask_ $
+    inSimulation (throwTo thread e) (\simulation -> deliver simulation thread (toException e))
 
 -- | 'interrupt' by a messenger of its own, which does the waiting.
 interruptByMessenger :: Exception e => ThreadId -> e -> IO ()
-interruptByMessenger thread e = do
-  messenger <- forkIO (interrupt thread e)
-  labelThread messenger (show (Label "interrupt" "messenger"))
+interruptByMessenger thread e =
+  inSimulation byMessenger (\simulation -> send simulation thread (toException e))
+ where
+  byMessenger = do
+    messenger <- forkIO (interrupt thread e)
+    labelThread messenger (show (Label "interrupt" "messenger"))
 
 -- | How many threads started by 'start' have not ended.
 living :: IO Int
@@ -128,7 +136,7 @@ modifyLiving change = atomicModifyIORef' livingCount (\n -> (n + change, ()))
 --
 -- @since 0.1.0.0
 atomically :: STM a -> IO a
-atomically = STM.atomically
+atomically transaction = inSimulation (STM.atomically transaction) (`transact` transaction)
 
 -- | 'atomically' that nothing can interrupt; for the end of threads that were asked to
 -- stop. GHC's deadlock detector is not heeded: it takes a thread that waits for a
@@ -138,24 +146,18 @@ atomicallyFirmly transaction = uninterruptibleMask_ waiting
  where
   waiting = try (atomically transaction) >>= either (\BlockedIndefinitelyOnSTM -> waiting) pure
 
--- | A moment at which a cancellation that is under way arrives, if the masking
--- state allows it. (GHC does that by itself; a simulation does it here.)
-checkpoint :: IO ()
-checkpoint = pure ()
-
--- | A length of time, or a moment on the clock of 'now', in seconds. Write it as
--- a literal: @sleep 0.5@; turn other numbers into it with 'realToFrac'.
+-- | A moment at which the others may run, and a cancellation that is under way
+-- arrives, if the masking state allows it.
 --
--- @since 0.1.0.0
-newtype Seconds = Seconds Double
-  deriving (Eq, Ord, Num, Fractional, Real, RealFrac)
-
-instance Show Seconds where
-  -- 0.05, and not 5.0e-2
-  showsPrec precedence (Seconds s) = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
-
-instance Read Seconds where
-  readsPrec precedence input = [(Seconds s, rest) | (s, rest) <- readsPrec precedence input]
+-- In reality that is so at any moment, and this does nothing. In a simulation it
+-- is so only where a behaviour does something by this library: put a checkpoint
+-- where in between it matters (before and after a call to hardware, say).
+--
+-- >>> checkpoint
+--
+-- @since 0.2.0.0
+checkpoint :: IO ()
+checkpoint = inSimulation (pure ()) pause
 
 -- | The time, in seconds since some fixed moment of this run of the program. It
 -- never goes backwards, and is not the time of day.
@@ -167,7 +169,7 @@ instance Read Seconds where
 --
 -- @since 0.1.0.0
 now :: IO Seconds
-now = Seconds <$> getMonotonicTime
+now = inSimulation (Seconds <$> getMonotonicTime) clock
 
 -- | Waits for at least so many seconds, without using the processor.
 --
@@ -187,13 +189,15 @@ sleep seconds = do
 
 -- | Sleeps until the clock shows the given moment, or a later one.
 sleepUntil :: Seconds -> IO ()
-sleepUntil moment = do
-  t <- now
-  when (moment > t) $ do
-    -- A day at a time: the longest delay that 'threadDelay' can count is shorter
-    -- than the longest that can be asked for.
-    threadDelay (ceiling (min 86400 (moment - t) * 1000000))
-    sleepUntil moment
+sleepUntil moment = inSimulation really (`await` moment)
+ where
+  really = do
+    t <- now
+    when (moment > t) $ do
+      -- A day at a time: the longest delay that 'threadDelay' can count is shorter
+      -- than the longest that can be asked for.
+      threadDelay (ceiling (min 86400 (moment - t) * 1000000))
+      really
 
 -- | Refuses what is no duration: a negative number, or NaN.
 duration :: String -> Seconds -> IO Seconds
@@ -211,19 +215,19 @@ refuse :: String -> String -> Seconds -> IO a
 refuse operator allowed seconds =
   throwIO (ErrorCall (operator ++ ": " ++ allowed ++ ", not " ++ show seconds))
 
--- | What can be reported of the life of a behaviour.
-data Event
-  = Started Label
-  | Ended Label
-  deriving (Eq, Ord, Show)
-
 -- | Reports every event to the given sink while the action runs. The sink is
 -- called by the thread that the event is about, masked; it must not block.
 reportingTo :: (Event -> IO ()) -> IO a -> IO a
 reportingTo sink = bracket_ (writeIORef eventSink (Just sink)) (writeIORef eventSink Nothing)
 
+-- | Says something that whoever watches should know.
+note :: String -> IO ()
+note = report . Noted
+
 report :: Event -> IO ()
-report event = readIORef eventSink >>= \sink -> for_ sink ($ event)
+report event = do
+  readIORef eventSink >>= \sink -> for_ sink ($ event)
+  inSimulation (pure ()) (`record` event)
 
 eventSink :: IORef (Maybe (Event -> IO ()))
 eventSink = unsafePerformIO (newIORef Nothing)

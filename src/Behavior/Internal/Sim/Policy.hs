@@ -1,0 +1,123 @@
+-- |
+-- Which thread runs when several could.
+module Behavior.Internal.Sim.Policy
+  ( Policy (..)
+  , Decision (..)
+  , policy
+  , switching
+  , random
+  , fully
+  ) where
+
+import Data.Bits (shiftR, xor)
+import Data.IORef
+import Data.Word (Word64)
+
+import Behavior.Internal.Sim.Types (Schedule (..))
+
+-- | A scheduling point at which several threads could run.
+data Decision = Decision
+  { decisionPoint :: !Int
+  , usual :: !Int
+  -- ^ Who runs in the undisturbed schedule.
+  , canGoOn :: !Bool
+  -- ^ Whether that is the thread which ran: any other is a pre-emption.
+  , candidates :: [Int]
+  -- ^ All that can run.
+  }
+
+-- | How decisions are made.
+data Policy = Policy
+  { askAt :: IO Int
+  -- ^ The number of the next scheduling point at which to ask, although the thread that
+  -- runs could go on. (Where it cannot, the policy is always asked.)
+  , decide :: Decision -> IO (Either String Int)
+  -- ^ One of the candidates; or why the schedule does not fit.
+  , unused :: IO [(Int, Int)]
+  -- ^ What is left of the schedule.
+  }
+
+policy :: Schedule -> IO Policy
+policy Undisturbed = switching True []
+policy (Switching exceptions) = switching True exceptions
+policy (Seeded seed) = random seed
+
+-- | Undisturbed but for some exceptions. Those that do not fit are refused, or (when the
+-- schedule is being shrunk) left out.
+switching :: Bool -> [(Int, Int)] -> IO Policy
+switching strictly exceptions = do
+  left <- newIORef exceptions
+  pure
+    Policy
+      { askAt = maybe maxBound fst . firstOf <$> readIORef left
+      , decide = \d -> do
+          due <- readIORef left
+          case dropWhile ((< decisionPoint d) . fst) due of
+            (p, thread) : later
+              | p == decisionPoint d -> do
+                  writeIORef left later
+                  pure (chosen d thread)
+            later -> do
+              writeIORef left (if strictly then due else later)
+              pure (Right (usual d))
+      , unused = readIORef left
+      }
+ where
+  firstOf [] = Nothing
+  firstOf (e : _) = Just e
+  chosen d thread
+    | thread `elem` candidates d = Right thread
+    | strictly =
+        Left $
+          "at point " ++ show (decisionPoint d) ++ " thread " ++ show thread ++ " cannot run; those that can: "
+            ++ show (candidates d)
+    | otherwise = Right (usual d)
+
+-- | A random schedule. Each has a rate of pre-emptions of its own, between one in four
+-- points and one in five hundred: few pre-emptions find most defects.
+random :: Int -> IO Policy
+random seed = do
+  state <- newIORef (fromIntegral seed * 0x9e3779b97f4a7c15 + 0x1234567)
+  let next = do
+        s <- (+ 0x9e3779b97f4a7c15) <$> readIORef state
+        writeIORef state s
+        pure (mixed s)
+      below :: Int -> IO Int
+      below n = (\word -> fromIntegral ((word `shiftR` 11) `mod` fromIntegral n)) <$> next
+  rate <- (\k -> 2 ^ (k + 2)) <$> below (8 :: Int)
+  let gap = below (2 * rate)
+  due <- gap >>= newIORef
+  pure
+    Policy
+      { askAt = readIORef due
+      , decide = \d -> do
+          wanted <- readIORef due
+          if decisionPoint d < wanted
+            then if canGoOn d then pure (Right (usual d)) else Right <$> among below (candidates d)
+            else do
+              further <- gap
+              writeIORef due (decisionPoint d + 1 + further)
+              Right <$> among below (candidates d)
+      , unused = pure []
+      }
+ where
+  among below these = (these !!) <$> below (length these)
+
+-- | The exceptions, then the undisturbed schedule; and tells the second action of every
+-- decision that there was after the last exception.
+fully :: [(Int, Int)] -> (Decision -> IO ()) -> IO Policy
+fully exceptions tell = do
+  inner <- switching True exceptions
+  pure
+    inner
+      { askAt = pure minBound
+      , decide = \d -> do
+          left <- unused inner
+          if null left then tell d >> pure (Right (usual d)) else decide inner d
+      }
+
+-- | The mixing function of SplitMix.
+mixed :: Word64 -> Word64
+mixed = folded 31 . (* 0x94d049bb133111eb) . folded 27 . (* 0xbf58476d1ce4e5b9) . folded 30
+ where
+  folded n word = word `xor` (word `shiftR` n)

@@ -1,0 +1,87 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- What came of a simulation, in words.
+module Behavior.Internal.Sim.Report
+  ( explain
+  , narrate
+  , aside
+  ) where
+
+import Control.Exception (SomeException, displayException)
+import Data.List (intercalate)
+import Numeric (showFFloat)
+
+import Behavior.Internal.Seam (Label, Seconds (..))
+import Behavior.Internal.Sim.Types
+
+-- | How a run ended, in words; and if it is a mistake, what to do about it.
+--
+-- @since 0.2.0.0
+explain :: Outcome a -> String
+explain = \case
+  Returned _ -> "it returned"
+  Failing e -> "it failed: " ++ text e
+  Faulting e -> "it faulted: " ++ text e
+  Cancelled e -> "it was cancelled: " ++ text e
+  Deadlock waiting ->
+    intercalate "\n  " ("deadlock: every thread waits, and nothing in the simulation will wake one" : map waits waiting)
+  Livelock labels -> "livelock: the virtual time stands still while these run on and on: " ++ commas labels
+  OutOfTime -> "the virtual time has come to the end that was set"
+  Outside label' blocked -> show label' ++ " waited outside of the simulation, " ++ instead blocked
+  Meddled waiting ->
+    intercalate "\n  " $
+      "something outside of the simulation changed what these waited for (a thread of forkIO or async? \
+      \start it by parallel, both or fork)"
+        : map waits waiting
+  TooSlow label' ->
+    show label'
+      ++ " ran when the limit of real time was reached: it computes for very long, or for ever (see patience)"
+  Misfit why -> "the schedule does not fit this behaviour: " ++ why
+ where
+  waits (Waiting who' what') = show who' ++ " waits for " ++ what'
+
+instead :: Blocked -> String
+instead = \case
+  InMVar ->
+    "at an MVar or for the time (takeMVar, threadDelay, System.Timeout.timeout, forkIO and a wait for it): \
+    \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
+  InTransaction ->
+    "in a transaction (Control.Concurrent.STM.atomically, or async's wait, race, concurrently): \
+    \use Behavior.Time.atomically, parallel, both, fork"
+  InThrowing -> "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork"
+  Elsewhere -> "for something that this library knows nothing of (threadDelay?): use sleep, or atomically"
+
+-- | What happened, a line for each step.
+--
+-- @since 0.2.0.0
+narrate :: [Step] -> String
+narrate made = unlines (map line made)
+ where
+  line s =
+    padLeft 10 (seconds (at s)) ++ " s  " ++ padRight width (who' s) ++ "  " ++ aside (did s)
+  who' s = show (number s) ++ " " ++ show (label s)
+  width = maximum (0 : map (length . who') made)
+  seconds (Seconds t) = showFFloat (Just 3) t ""
+  padLeft n t = replicate (n - length t) ' ' ++ t
+  padRight n t = t ++ replicate (n - length t) ' '
+
+-- | What a thread did, in words.
+aside :: Did -> String
+aside = \case
+  Starts -> "starts"
+  Ends -> "ends"
+  Says what' -> what'
+  Hears e -> "is interrupted: " ++ e
+  Throws target -> "asks " ++ show target ++ " to stop"
+  Transacts -> "transaction"
+  Sleeps (Seconds t)
+    | isInfinite t -> "sleeps for ever"
+    | otherwise -> "sleeps until " ++ showFFloat (Just 3) t " s"
+  IsPreempted -> "-- another thread runs first"
+
+commas :: [Label] -> String
+commas = intercalate ", " . map show
+
+text :: SomeException -> String
+text = displayException

@@ -1,0 +1,140 @@
+-- |
+-- A simulated run, from its beginning to its end.
+module Behavior.Internal.Sim.Simulate
+  ( simulate
+  , simulateWith
+  , simulateBy
+  ) where
+
+import Control.Concurrent
+import Control.Exception hiding (Deadlock)
+import Control.Monad (unless, when)
+import Data.IORef
+import qualified Data.IntMap.Strict as IntMap
+import Data.Maybe (isJust)
+import System.IO.Unsafe (unsafePerformIO)
+
+import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
+import Behavior.Internal.Seam
+import Behavior.Internal.Sim.Policy
+import Behavior.Internal.Sim.Scheduler
+import Behavior.Internal.Sim.Types
+import Behavior.Internal.Sim.Watchdog
+
+-- | Runs a behaviour in a simulation, by the undisturbed schedule.
+--
+-- > simulate  =  simulateWith defaults
+--
+-- @since 0.2.0.0
+simulate :: Behavior a -> IO (Run a)
+simulate = simulateWith defaults
+
+-- | 'simulate' as the options say.
+--
+-- @since 0.2.0.0
+simulateWith :: Options -> Behavior a -> IO (Run a)
+simulateWith o act = do
+  chooser' <- policy (scheduled o)
+  simulateBy o chooser' act
+
+simulateBy :: Options -> Policy -> Behavior a -> IO (Run a)
+simulateBy o chooser' act = do
+  nested <- simulator
+  when (isJust nested) . throwIO . ErrorCall $
+    "simulate: a simulation inside of a simulation: run the inner behaviour as part of the outer one"
+  result <- newIORef Nothing
+  n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
+  sim <- newSim o chooser'
+  mask $ \restore -> taking n (simulation sim) . watched n sim $ do
+    main <- launch sim (-1) (Label "main" "") (\begin unmask -> try (unmask (begin >> act)) >>= writeIORef result . Just) (const (pure ()))
+    writeIORef (current sim) main
+    putMVar (gate main) ()
+    verdict <- try (restore (takeMVar (over sim)))
+    left <- fmap taskLabel . filter (isJust . taskThread) . IntMap.elems <$> readIORef (tasks sim)
+    time' <- readIORef (time sim)
+    made <- reverse <$> readIORef (history sim)
+    count <- readIORef (counter sim)
+    uninterruptibleMask_ (unwind sim verdict)
+    end <- readIORef result
+    switches <- reverse <$> readIORef (taken sim)
+    rest <- unused chooser'
+    case verdict of
+      Left e -> throwIO (e :: SomeException)
+      Right v ->
+        pure
+          Run
+            { outcome = outcomeOf v end rest
+            , finished = time'
+            , steps = made
+            , schedule = Switching switches
+            , points = count
+            , leftRunning = left
+            }
+
+simulationNumber :: IORef Int
+simulationNumber = unsafePerformIO (newIORef 0)
+{-# NOINLINE simulationNumber #-}
+
+-- | How the run ended, and how the behaviour did, if it did.
+outcomeOf :: Verdict -> Maybe (Either SomeException a) -> [(Int, Int)] -> Outcome a
+outcomeOf verdict end rest = case verdict of
+  Over -> case (rest, end) of
+    ((p, thread) : _, _) -> Misfit ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
+    ([], Just (Right a)) -> Returned a
+    ([], Just (Left e))
+      | isFailure e -> Failing e
+      | isCancellation e -> Cancelled e
+      | otherwise -> Faulting e
+    ([], Nothing) -> Misfit "unreachable"
+  Hopeless waiting -> Deadlock waiting
+  Standing who' -> Livelock who'
+  Late -> OutOfTime
+  Tampered waiting -> Meddled waiting
+  Stuck who' how -> Outside who' how
+  Slow who' -> TooSlow who'
+  Unfit why -> Misfit why
+
+-- | Ends all tasks, the youngest first, one at a time.
+unwind :: Sim -> Either SomeException Verdict -> IO ()
+unwind sim verdict = do
+  writeIORef (unwinding sim) True
+  writeIORef (askingAt sim) minBound
+  when keptTurn recall
+  writeIORef (driven sim) True
+  next
+ where
+  -- Whoever ran has the turn still.
+  keptTurn = case verdict of
+    Left _ -> True
+    Right (Stuck _ _) -> True
+    Right (Slow _) -> True
+    Right _ -> False
+
+  -- It gives it back at its next operation, or at its end. If it does not come to either,
+  -- what it waits in is interrupted; and if that does not help it is left behind.
+  recall = do
+    returned <- soon 50
+    unless returned $ do
+      runner <- readIORef (current sim)
+      mapM_ (\thread -> forkIO (throwTo thread Unwind)) (taskThread runner)
+      heard <- soon 1000
+      unless heard $ modifyIORef' (tasks sim) (IntMap.delete (taskNumber runner))
+
+  soon :: Int -> IO Bool
+  soon 0 = pure False
+  soon k = do
+    returned <- (||) <$> (isJust <$> tryTakeMVar (back sim)) <*> (isJust <$> tryTakeMVar (over sim))
+    if returned then pure True else threadDelay 1000 >> soon (k - 1)
+
+  next = do
+    alive <- readIORef (tasks sim)
+    case IntMap.lookupMax alive of
+      Nothing -> pure ()
+      Just (n, task) -> do
+        when (isJust (taskThread task)) $ do
+          writeIORef (strikes sim) 0
+          writeIORef (current sim) task
+          putMVar (gate task) ()
+          takeMVar (back sim)
+        modifyIORef' (tasks sim) (IntMap.delete n)
+        next

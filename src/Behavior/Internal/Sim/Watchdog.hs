@@ -1,0 +1,120 @@
+{-# LANGUAGE CPP #-}
+
+-- |
+-- Looks after the simulations that run, by real time: a thread that waits outside of this
+-- library, or never gives the turn back, would halt everything.
+module Behavior.Internal.Sim.Watchdog
+  ( watched
+  ) where
+
+import Control.Concurrent
+import Control.Exception (bracket_, mask_)
+import Control.Monad (unless, void, when)
+import Data.IORef
+import Data.Map.Strict (Map)
+import qualified Data.Map.Strict as Map
+import GHC.Clock (getMonotonicTime)
+import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
+import System.IO.Unsafe (unsafePerformIO)
+
+#if !defined(mingw32_HOST_OS)
+import System.Exit (ExitCode (..))
+import System.IO (hFlush, hPutStrLn, stderr)
+import System.Posix.Process (exitImmediately)
+#endif
+
+import Behavior.Internal.Seam (Seconds (..))
+import Behavior.Internal.Sim.Scheduler
+import Behavior.Internal.Sim.Types
+
+-- | The simulations to look after. The watchdog holds on to them: so GHC does not take
+-- their threads, which only a waiting thread could wake, for deadlocked.
+kennel :: IORef (Map Int Sim, Bool)
+kennel = unsafePerformIO (newIORef (Map.empty, False))
+{-# NOINLINE kennel #-}
+
+-- | Has the simulation of this number looked after while the action runs.
+watched :: Int -> Sim -> IO a -> IO a
+watched n sim = bracket_ enter (change (\(sims, awake) -> ((Map.delete n sims, awake), ())))
+ where
+  enter = do
+    awake <- change (\(sims, awake) -> ((Map.insert n sim sims, True), awake))
+    unless awake $ do
+      (here, _) <- threadCapability =<< myThreadId
+      -- On another capability, if there is one: this one may be kept busy.
+      void (mask_ (forkOn (here + 1) (patrol Map.empty 0)))
+
+change :: ((Map Int Sim, Bool) -> ((Map Int Sim, Bool), b)) -> IO b
+change = atomicModifyIORef' kennel
+
+-- | What was seen of a simulation.
+data Sight = Sight
+  { atPoint :: !Int
+  , waits :: !Int
+  -- ^ How often it was seen there, waiting elsewhere.
+  , since :: !Double
+  -- ^ When it was first seen at all.
+  , told :: !Bool
+  -- ^ Whether its run was ended for that.
+  }
+
+-- | Looks every few milliseconds, for as long as there is something to look after.
+patrol :: Map Int Sight -> Int -> IO ()
+patrol seen idle = do
+  threadDelay 5000
+  (sims, _) <- readIORef kennel
+  if Map.null sims && idle > 20
+    then do
+      go <- change (\(now', _) -> if Map.null now' then ((now', False), False) else ((now', True), True))
+      when go (patrol seen 0)
+    else do
+      sights <- Map.traverseWithKey (\n sim -> look sim (Map.lookup n seen)) sims
+      patrol sights (if Map.null sims then idle + 1 else 0)
+
+look :: Sim -> Maybe Sight -> IO Sight
+look sim before = do
+  n <- readIORef (counter sim)
+  runner <- readIORef (current sim)
+  status <- maybe (pure ThreadFinished) threadStatus (taskThread runner)
+  t <- getMonotonicTime
+  case before of
+    Nothing -> pure (Sight n 0 t False)
+    Just sight
+      | t - since sight > allowed -> do
+          -- Nothing more can be done with one that does not even hear that it should
+          -- stop, not even a regular exit.
+          when (t - since sight > allowed + 5) (giveUp runner)
+          tell sight (Slow (taskLabel runner))
+      | n == atPoint sight, Just how <- blocked status -> do
+          let seen = sight {waits = waits sight + 1}
+          -- Whoever was to be unwound, and waits elsewhere for it, is left behind.
+          when (waits seen >= 200) (void (tryPutMVar (back sim) ()))
+          if waits seen < 5 then pure seen else tell seen (Stuck (taskLabel runner) how)
+      | otherwise -> pure sight {atPoint = n, waits = 0}
+ where
+  Seconds allowed = patience (options sim)
+  tell sight verdict = do
+    unless (told sight) (void (tryPutMVar (over sim) verdict))
+    pure sight {told = True}
+
+-- | In what a thread waits. (Foreign calls are allowed: they end by themselves, or else
+-- run into the limit of real time.)
+blocked :: ThreadStatus -> Maybe Blocked
+blocked (ThreadBlocked reason) = case reason of
+  BlockedOnMVar -> Just InMVar
+  BlockedOnSTM -> Just InTransaction
+  BlockedOnException -> Just InThrowing
+  BlockedOnOther -> Just Elsewhere
+  _ -> Nothing
+blocked _ = Nothing
+
+-- | Ends the process, with a message.
+giveUp :: Task -> IO ()
+#if defined(mingw32_HOST_OS)
+giveUp _ = pure ()
+#else
+giveUp runner = do
+  hPutStrLn stderr ("simulate: " ++ show (taskLabel runner) ++ " cannot be stopped")
+  hFlush stderr
+  void (exitImmediately (ExitFailure 124))
+#endif
