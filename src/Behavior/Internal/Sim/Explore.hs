@@ -185,25 +185,48 @@ exploring (Plan how o) property = case how of
 
   fullSearch k limit = go 0 0 [([], k)]
    where
-    go :: Int -> Int -> [([(Int, Int)], Int)] -> IO (Either Counterexample Report)
+    go :: Int -> Int -> [Prefix] -> IO (Either Counterexample Report)
     go n total [] = pure (Right (Report n True total))
-    go n total ((prefix, left) : others)
+    go n total (prefix : others)
       | n >= limit = pure (Right (Report n False total))
       | otherwise = do
-          found <- newIORef []
-          let tell d =
-                let cost = if canGoOn d then 1 else 0
-                    further = [(prefix ++ [(decisionPoint d, c)], left - cost) | c <- candidates d, c /= usual d]
-                 in when (cost <= left) (modifyIORef' found (further ++))
-          t <- try' (fully prefix tell)
+          (t, further) <- branching prefix
           case thrown t of
-            Nothing -> readIORef found >>= \new -> go (n + 1) (total + size t) (new ++ others)
+            Nothing -> go (n + 1) (total + size t) (further ++ others)
             Just e -> Left <$> reduced (n + 1) e t
 
+  -- Runs the undisturbed schedule but for these exceptions; and which more there could
+  -- be, after them.
+  branching (switches', left) = do
+    found <- newIORef []
+    let tell d =
+          let cost = if canGoOn d then 1 else 0
+              further = [(switches' ++ [(decisionPoint d, c)], left - cost) | c <- candidates d, c /= usual d]
+           in when (cost <= left) (modifyIORef' found (further ++))
+    t <- try' (fully switches' tell)
+    (,) t <$> readIORef found
+
   reduced i e t = do
-    (shortest, e') <- shrunk (switches t) e
-    again <- attempting o {detailed = True} (switching True shortest) property
-    pure Counterexample {failing = Switching shortest, because = e', story = happened again, foundAfter = i}
+    (fewer, e') <- shrunk (switches t) e
+    (fewest, e'') <- simplest fewer e'
+    again <- attempting o {detailed = True} (switching True fewest) property
+    pure Counterexample {failing = Switching fewest, because = e'', story = happened again, foundAfter = i}
+
+  -- To leave out one switch moves what comes after it, so that the others may miss their
+  -- points. So it looks afresh, the schedules with the fewest switches first.
+  simplest :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
+  simplest known why = go (2000 :: Int) [([], 2)] []
+   where
+    go budget [] later
+      | null later || budget <= 0 = pure (known, why)
+      | otherwise = go budget (reverse later) []
+    go budget (prefix : others) later
+      | budget <= 0 || length (fst prefix) >= length known = pure (known, why)
+      | otherwise = do
+          (t, further) <- branching prefix
+          case thrown t of
+            Just e -> pure (fst prefix, e)
+            Nothing -> go (budget - 1) others (foldl (flip (:)) later further)
 
   -- Leaves out halves, quarters... of the switches, as long as it still fails.
   shrunk :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
@@ -221,6 +244,9 @@ exploring (Plan how o) property = case how of
             Just e' | length (switches t) < length these -> go (budget - 1) (min chunk (length (switches t))) (switches t) e'
             _ -> attemptAll (budget - 1) chunk more these why
   without n these = [take i these ++ drop (i + n) these | i <- [0, n .. length these - 1]]
+
+-- | Switches, and how many pre-emptions more there may be.
+type Prefix = ([(Int, Int)], Int)
 
 -- | Runs the property once.
 attempting :: Options -> IO Policy -> ((forall a. Behavior a -> IO (Run a)) -> IO ()) -> IO Trial

@@ -60,7 +60,7 @@ switching strictly exceptions = do
             later -> do
               writeIORef left (if strictly then due else later)
               pure (Right (usual d))
-      , unused = readIORef left
+      , unused = if strictly then readIORef left else pure []
       }
  where
   firstOf [] = Nothing

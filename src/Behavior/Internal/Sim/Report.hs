@@ -9,7 +9,7 @@ module Behavior.Internal.Sim.Report
   ) where
 
 import Control.Exception (SomeException, displayException)
-import Data.List (intercalate)
+import Data.List (groupBy, intercalate)
 import Numeric (showFFloat)
 
 import Behavior.Internal.Seam (Label, Seconds (..))
@@ -52,12 +52,13 @@ instead = \case
   InThrowing -> "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork"
   Elsewhere -> "for something that this library knows nothing of (threadDelay?): use sleep, or atomically"
 
--- | What happened, a line for each step.
+-- | What happened, a line for each step (what repeats itself is told once).
 --
 -- @since 0.2.0.0
 narrate :: [Step] -> String
-narrate made = unlines (map line made)
+narrate made = unlines (map (line . head) (groupBy repeated made))
  where
+  repeated s t = (at s, number s, did s) == (at t, number t, did t)
   line s =
     padLeft 10 (seconds (at s)) ++ " s  " ++ padRight width (who' s) ++ "  " ++ aside (did s)
   who' s = show (number s) ++ " " ++ show (label s)

@@ -237,11 +237,16 @@ operation sim op = do
 
 -- | Counts a scheduling point; whether who has the turn keeps it, if it can go on.
 keeps :: Sim -> IO Bool
-keeps sim = do
+keeps sim = tick sim >>= \n -> (n <) <$> readIORef (askingAt sim)
+{-# INLINE keeps #-}
+
+-- | Each decision has a number of its own.
+tick :: Sim -> IO Int
+tick sim = do
   n <- (+ 1) <$> readIORef (counter sim)
   writeIORef (counter sim) $! n
-  (n <) <$> readIORef (askingAt sim)
-{-# INLINE keeps #-}
+  pure n
+{-# INLINE tick #-}
 
 -- | Runs a transaction, in its turn.
 transaction :: Sim -> STM a -> IO a
@@ -318,7 +323,7 @@ arrive sim me = do
 leave :: Sim -> Task -> STM () -> IO ()
 leave sim me publish = do
   ending <- readIORef (unwinding sim)
-  unless ending (handOn sim Free `catch` \Unwind -> pure ())
+  unless ending (tick sim >> handOn sim Free `catch` \Unwind -> pure ())
   STM.atomically publish
   committed sim
   modifyIORef' (tasks sim) (IntMap.delete (taskNumber me))
@@ -329,7 +334,7 @@ leave sim me publish = do
     else
       if taskNumber me == 0
         then conclude sim Over
-        else choose sim Nothing >>= mapM_ (turnTo sim)
+        else tick sim >> choose sim Nothing >>= mapM_ (turnTo sim)
 
 -- | Ends the run. If somebody else has ended it meanwhile, the turn goes to the driver.
 conclude :: Sim -> Verdict -> IO ()
@@ -379,7 +384,7 @@ choose sim me = do
       Before _ (Delivery target e) -> arriveAt target e
       _ -> pure ()
     modifyIORef' (tasks sim) (IntMap.delete (taskNumber messenger))
-    modifyIORef' (counter sim) (+ 1)
+    _ <- tick sim
     choose sim me
 
 -- | What was thrown to the task has arrived, if that has not ended.

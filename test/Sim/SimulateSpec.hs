@@ -1,0 +1,279 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- One simulated run.
+module Sim.SimulateSpec (spec) where
+
+import Control.Concurrent
+import Control.Concurrent.Async (async, cancel, concurrently, race, wait, withAsync)
+import Control.Concurrent.STM (modifyTVar', newTVarIO, readTVar, readTVarIO, retry, writeTVar)
+import qualified Control.Concurrent.STM as STM
+import Control.Exception hiding (Deadlock)
+import Control.Monad (forM_, forever, unless, void)
+import Data.IORef
+import Data.List (isInfixOf, nub)
+import qualified System.Timeout as System
+import System.Mem (performMajorGC)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Internal.Runtime (note)
+import Behavior.Parallel (fork, scoped)
+import qualified Behavior.Signal as Signal
+import Behavior.Sim
+import Behavior.Time (atomically, checkpoint, now, timeout)
+import Support hiding (note)
+
+spec :: Spec
+spec = guarded $ do
+  describe "A simulated run" $ do
+    describe "ends" outcomes
+    describe "takes virtual time" times
+    describe "is the same for the same schedule" deterministic
+    describe "delivers a cancellation by GHC's rule" delivery
+  describe "A mistake is told:" mistakes
+  describe "When the run has ended," unwinding
+  describe "Beside other runs," beside
+
+-- | How a run ended, in words.
+ended :: Show a => Run a -> String
+ended run = case outcome run of
+  Returned a -> "returned " ++ show a
+  Faulting e -> "faulted " ++ show e
+  Failing e -> "failed " ++ show e
+  Cancelled e -> "cancelled " ++ show e
+  other -> explain other
+
+outcomes :: Spec
+outcomes = do
+  it "with the value" $ ended <$> simulate (pure 'a') `shouldReturn` "returned 'a'"
+  it "with the failure" $
+    ended <$> simulate (failWith "locked" :: Behavior ()) `shouldReturn` "failed FailedBecause \"locked\""
+  it "with the fault" $
+    ended <$> simulate (throwIO (Fault "bug") :: Behavior ()) `shouldReturn` "faulted Fault \"bug\""
+  it "with a cancellation that the behaviour threw itself" $
+    ended <$> simulate (throwIO (Cancel "user") :: Behavior ()) `shouldReturn` "cancelled Cancel \"user\""
+
+times :: Spec
+times = do
+  it "from 0, and none of the real" $ do
+    run <- simulate (now >>= \t -> sleep 86400 >> (,) t <$> now)
+    ended run `shouldBe` "returned (0.0,86400.0)"
+    finished run `shouldBe` 86400
+  it "which is the longest of what runs at once" $
+    finished <$> simulate (both (sleep 3) (sleep 2 >> sleep 2)) `shouldReturn` 4
+  it "and none for what takes none" $
+    finished <$> simulate (both (pure ()) (atomically (pure ()))) `shouldReturn` 0
+  it "and sleepers of the same moment tie" $ do
+    book <- newNotebookOf
+    forM_ [1 .. 40] $ \seed -> do
+      order <- newTVarIO []
+      let arm name = sleep 1 >> atomically (modifyTVar' order (name :))
+      _ <- simulateWith defaults {scheduled = Seeded seed} (both (arm 'l') (arm 'r'))
+      readTVarIO order >>= \o -> modifyIORef book (o :)
+    nub <$> readIORef book >>= (`shouldMatchList` ["lr", "rl"])
+  it "up to the end that is set" $ do
+    run <- simulateWith defaults {endAt = 10} (forever (sleep 3) :: Behavior ())
+    explain (outcome run) `shouldContain` "the end that was set"
+    finished run `shouldBe` 10
+ where
+  newNotebookOf = newIORef ([] :: [String])
+
+-- | A small mission with everything in it.
+mission :: Behavior Int
+mission = do
+  battery <- newTVarIO (30 :: Int)
+  let low = (< 10) <$> Signal.watching (readTVar battery)
+      change f = atomically (modifyTVar' battery f)
+      work = forM_ [1 .. 5 :: Int] (\_ -> sleep 1 >> change (subtract 7))
+  Signal.monitor low (sleep 3 >> change (const 100)) work
+    `parallel` monitor (pure False) (pure ()) (sleep 60)
+  readTVarIO battery
+
+deterministic :: Spec
+deterministic = do
+  it "to the step" $
+    forM_ [1 .. 50] $ \seed -> do
+      let options = defaults {scheduled = Seeded seed, detailed = True}
+      one <- simulateWith options mission
+      other <- simulateWith options mission
+      (ended one, steps one, schedule one) `shouldBe` (ended other, steps other, schedule other)
+  it "and the schedule that a run tells of replays it" $
+    forM_ [1 .. 50] $ \seed -> do
+      one <- simulateWith defaults {scheduled = Seeded seed, detailed = True} mission
+      other <- simulateWith defaults {scheduled = schedule one, detailed = True} mission
+      (ended one, steps one, schedule one) `shouldBe` (ended other, steps other, schedule other)
+  it "and another for another" $ do
+    runs <- mapM (\seed -> simulateWith defaults {scheduled = Seeded seed} mission) [1 .. 50]
+    length (nub (map (show . schedule) runs)) `shouldSatisfy` (> 25)
+  it "also when garbage is collected meanwhile" $ do
+    -- Whoever waits for its turn is not taken for deadlocked.
+    run <- simulate (both (forM_ [1 .. 5 :: Int] (\_ -> performMajorGC >> sleep 1)) (sleep 3 >> sleep 4))
+    ended run `shouldBe` "returned ()"
+
+-- | What a branch in this state has done when another branch has failed just before.
+delivery :: Spec
+delivery = do
+  it "unmasked: at any operation" $ reached id (sleep 1) `shouldReturn` []
+  it "masked: not at one that need not wait" $
+    reached mask_ (atomically (pure ())) `shouldReturn` ["went on"]
+  it "masked: at one that waits" $ reached mask_ (atomically retry) `shouldReturn` []
+  it "masked: at one that sleeps" $ reached mask_ (sleep 1) `shouldReturn` []
+  it "masked uninterruptibly: never" $
+    reached uninterruptibleMask_ (sleep 1) `shouldReturn` ["went on"]
+  it "never to the end of a thread" $ do
+    book <- newIORef []
+    _ <- simulate (parallel (modifyIORef book ("went on" :)) (failed :: Behavior ())) 
+    readIORef book `shouldReturn` ["went on"]
+  it "to a thread that has not begun: before its first step" $ do
+    book <- newIORef []
+    -- The second thread is the third to run, when the first has failed.
+    void . simulateWith defaults {scheduled = Switching [(4, 1), (5, 1), (6, 0)]} $
+      parallel (failed :: Behavior ()) (modifyIORef book ("began" :))
+    began <- readIORef book
+    began `shouldSatisfy` (`elem` [[], ["began"]])
+ where
+  -- The operation is asked to stop at the time 0 at which it begins.
+  reached masked operation = do
+    book <- newIORef []
+    asked <- newTVarIO False
+    void . simulate $
+      parallel
+        (masked (atomically (readTVar asked >>= STM.check) >> operation >> modifyIORef book ("went on" :)))
+        (atomically (writeTVar asked True) >> (failed :: Behavior ()))
+        ? pure ()
+    readIORef book
+
+mistakes :: Spec
+mistakes = do
+  it "a deadlock, and who waits for what" $ do
+    run <- simulate (both (atomically retry :: Behavior ()) (sleep (1 / 0)))
+    lines (explain (outcome run))
+      `shouldBe` [ "deadlock: every thread waits, and nothing in the simulation will wake one"
+                 , "  main waits for its branches: both: left, both: right"
+                 , "  both: left waits for a transaction"
+                 , "  both: right waits for the end of time"
+                 ]
+  it "a livelock" $ do
+    run <- simulateWith defaults {standstill = 3000} (parallel (forever checkpoint) (forever checkpoint))
+    explain (outcome run)
+      `shouldBe` "livelock: the virtual time stands still while these run on and on: parallel: left, parallel: right"
+  it "a livelock of one thread" $ do
+    run <- simulateWith defaults {standstill = 3000} (forever checkpoint :: Behavior ())
+    explain (outcome run) `shouldContain` "livelock"
+  describe "who waits outside of the library," $ do
+    outside "takeMVar" (newEmptyMVar >>= takeMVar) "use atomically and a TMVar"
+    outside "threadDelay" (threadDelay 10000000) "use atomically and a TMVar, sleep"
+    outside "retry" (STM.atomically retry) "use Behavior.Time.atomically"
+    outside "System.Timeout" (void (System.timeout 10000000 (newEmptyMVar >>= takeMVar :: IO ()))) "Behavior.Time.timeout"
+    outside "async" (async (threadDelay 10000000) >>= wait) "use Behavior.Time.atomically, parallel, both, fork"
+    outside "race" (void (race (threadDelay 10000000) (threadDelay 10000000))) "use "
+    outside "forkIO" (newEmptyMVar >>= \box -> forkIO (threadDelay 10000000 >> putMVar box ()) >> takeMVar box) "forkIO and a wait for it"
+  it "that something outside woke somebody" $ do
+    flag <- newTVarIO False
+    run <- simulate $ do
+      void (forkIO (threadDelay 500 >> STM.atomically (writeTVar flag True)))
+      atomically (readTVar flag >>= STM.check)
+    explain (outcome run) `shouldContain` "something outside of the simulation changed what these waited for"
+  it "a computation without end" $ do
+    run <- simulateWith defaults {patience = 0.1} (mapM_ (evaluate . length . show) [0 :: Int ..])
+    explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
+  it "a simulation inside of a simulation" $ do
+    run <- simulate (finished <$> simulate (pure ()))
+    ended run `shouldContain` "simulate: a simulation inside of a simulation"
+  describe "a schedule that does not fit" $ do
+    let small = both (sleep 1) (sleep 2)
+        misfit switches text = do
+          run <- simulateWith defaults {scheduled = Switching switches} small
+          explain (outcome run) `shouldContain` ("the schedule does not fit this behaviour: " ++ text)
+    it "as no such thread can run" $ misfit [(3, 7)] "at point 3 thread 7 cannot run; those that can: [1,2]"
+    it "as the run is shorter" $ misfit [(300, 1)] "the run ended before point 300"
+    it "as only one could run there" $ misfit [(1, 1)] "the run ended before point 1"
+ where
+  outside name act advice = it (name ++ ", and what to use instead") $ do
+    run <- simulate (parallel act (sleep 1))
+    let text = explain (outcome run)
+    text `shouldSatisfy` ("waited outside of the simulation" `isInfixOf`)
+    text `shouldSatisfy` (advice `isInfixOf`)
+
+unwinding :: Spec
+unwinding = do
+  it "after a deadlock, every cleanup has run, one at a time" $ do
+    book <- newIORef []
+    inside <- newIORef (0 :: Int)
+    let cleaned name = do
+          modifyIORef inside (+ 1)
+          forM_ [1 .. 100 :: Int] (const yield)
+          n <- readIORef inside
+          unless (n == 1) (modifyIORef book ("not alone" :))
+          modifyIORef inside (subtract 1)
+          modifyIORef book (name :)
+        hanging name = (atomically retry :: Behavior ()) `finally` cleaned name
+    _ <- simulate (both (hanging "left") (hanging "right") `finally` cleaned "main")
+    reverse <$> readIORef book `shouldReturn` ["right", "left", "main"]
+  it "a cleanup's transactions and sleeps are done" $ do
+    motor <- newTVarIO True
+    _ <- simulate ((atomically retry :: Behavior ()) `finally` (sleep 1 >> atomically (writeTVar motor False)))
+    readTVarIO motor `shouldReturn` False
+  it "a cleanup that waits, or starts something, is unwound too" $ do
+    book <- newIORef []
+    _ <-
+      simulate $
+        (atomically retry :: Behavior ())
+          `finally` (both (atomically retry :: Behavior ()) (atomically retry :: Behavior ()) `finally` modifyIORef book ("inner" :))
+          `finally` modifyIORef book ("outer" :)
+    reverse <$> readIORef book `shouldReturn` ["inner", "outer"]
+  it "one that catches everything for ever does not run on" $ do
+    count <- newIORef (0 :: Int)
+    let stubborn = forever $ do
+          modifyIORef count (+ 1)
+          try (atomically retry) >>= \(_ :: Either SomeException ()) -> pure ()
+    _ <- try (evaluate =<< simulate (stubborn :: Behavior ())) :: IO (Either SomeException (Run ()))
+    counted <- readIORef count
+    performMajorGC
+    threadDelay 1000
+    readIORef count `shouldReturn` counted
+  it "what the time's end cut off has run its cleanup" $ do
+    book <- newIORef []
+    _ <- simulateWith defaults {endAt = 1} (parallel (sleep 5 `finally` modifyIORef book ("left" :)) (sleep 9 `finally` modifyIORef book ("right" :)))
+    reverse <$> readIORef book `shouldReturn` ["right", "left"]
+  it "so it is when whoever simulates is cancelled" $ do
+    book <- newIORef []
+    begun <- newEmptyMVar
+    let busy = (putMVar begun () >> forever checkpoint) `finally` modifyIORef book ("cleaned up" :)
+    withAsync (simulateWith defaults {standstill = maxBound} (parallel busy (atomically retry :: Behavior ()))) $ \caller -> do
+      takeMVar begun
+      cancel caller
+    readIORef book `shouldReturn` ["cleaned up"]
+  it "a fork that outlives its scope cannot be" $ do
+    run <- simulate (scoped (\nursery -> void (fork nursery (sleep 100)) >> sleep 1))
+    (finished run, leftRunning run) `shouldBe` (1, [])
+
+beside :: Spec
+beside = do
+  it "two simulations at once do not disturb each other" $ do
+    alone <- simulateWith defaults {scheduled = Seeded 7, detailed = True} mission
+    (one, other) <-
+      concurrently
+        (mapM (\_ -> simulateWith defaults {scheduled = Seeded 7, detailed = True} mission) [1 .. 20 :: Int])
+        (mapM (\_ -> simulateWith defaults {scheduled = Seeded 7, detailed = True} mission) [1 .. 20 :: Int])
+    forM_ (one ++ other) $ \run -> steps run `shouldBe` steps alone
+  it "a real behaviour runs in real time" $ do
+    begun <- newEmptyMVar
+    stop <- newTVarIO False
+    let simulated = do
+          putMVar begun ()
+          forever (sleep 1 >> readTVarIO stop >>= \over -> if over then failed else pure ())
+    withAsync (simulate (simulated :: Behavior ())) $ \caller -> do
+      takeMVar begun
+      begin <- now
+      timeout 0.01 (both (sleep 0.001) (sleep 0.002))
+      end <- now
+      atomically (writeTVar stop True)
+      run <- wait caller
+      ended run `shouldBe` "failed Failed"
+      (end - begin) `shouldSatisfy` (>= 0.002)
+  it "a note of theirs is not in the record" $ do
+    note "of nobody"
+    run <- simulate (note "of mine")
+    [text | Says text <- map did (steps run)] `shouldBe` ["of mine"]
