@@ -26,6 +26,10 @@ import qualified Paper.DoorsSpec
 import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
+import qualified Sim.ExploreSpec
+import qualified Sim.MockSpec
+import qualified Sim.RecordSpec
+import qualified Sim.SimulateSpec
 
 main :: IO ()
 main = hspec $ do
@@ -49,6 +53,11 @@ main = hspec $ do
   describe "Space" $ do
     Behavior.SpaceSpec.spec
     Behavior.ReactiveSpaceSpec.spec
+  describe "Simulation" $ do
+    Sim.SimulateSpec.spec
+    Sim.ExploreSpec.spec
+    Sim.RecordSpec.spec
+    Sim.MockSpec.spec
   describe "The paper" $ do
     Paper.ListingsSpec.spec
     Paper.DoorsSpec.spec

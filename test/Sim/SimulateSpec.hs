@@ -267,7 +267,7 @@ beside = do
     withAsync (simulate (simulated :: Behavior ())) $ \caller -> do
       takeMVar begun
       begin <- now
-      timeout 0.01 (both (sleep 0.001) (sleep 0.002))
+      timeout 10 (both (sleep 0.001) (sleep 0.002))
       end <- now
       atomically (writeTVar stop True)
       run <- wait caller

@@ -68,14 +68,15 @@ data Thread a = Thread
 -- | Starts a thread in which the action runs unmasked, whatever the caller's
 -- masking state. Call it masked, or the thread may be lost before it is returned.
 start :: Label -> IO a -> IO (Thread a)
-start label act = do
-  modifyLiving 1
+start label act =
   inSimulation really $ \simulation -> do
     end <- STM.newEmptyTMVarIO
     thread <- spawn simulation label (life label act) (STM.putTMVar end)
+    modifyLiving 1
     pure Thread {threadId = thread, threadEnd = STM.readTMVar end}
  where
   really = do
+    modifyLiving 1
     -- Forked masked: an exception cannot strike before 'try' is in place, nor
     -- between the end of the action and the publication of how it ended.
     thread <- asyncWithUnmask (life label act (pure ()))

@@ -1,6 +1,4 @@
 {-# LANGUAGE LambdaCase #-}
-{-# LANGUAGE RankNTypes #-}
-{-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
 -- Many schedules of one behaviour.
@@ -26,6 +24,10 @@ import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
+
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Sim
 
 -- | Which schedules to run, and how.
 --
@@ -151,7 +153,7 @@ data Trial = Trial
 -- True
 --
 -- @since 0.2.0.0
-explore :: Plan -> ((forall a. Behavior a -> IO (Run a)) -> IO ()) -> IO Report
+explore :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Report
 explore plan property =
   exploring plan property >>= \case
     Left counterexample -> throwIO counterexample
@@ -161,7 +163,7 @@ explore plan property =
 --
 -- @since 0.2.0.0
 exploring
-  :: Plan -> ((forall a. Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
+  :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
 exploring (Plan how o) property = case how of
   Random n seed -> randomSearch n seed
   Exhaustive k limit -> fullSearch k limit
@@ -215,7 +217,7 @@ exploring (Plan how o) property = case how of
   -- To leave out one switch moves what comes after it, so that the others may miss their
   -- points. So it looks afresh, the schedules with the fewest switches first.
   simplest :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
-  simplest known why = go (2000 :: Int) [([], 2)] []
+  simplest known why = go (2000 :: Int) [([], 2 :: Int)] []
    where
     go budget [] later
       | null later || budget <= 0 = pure (known, why)
@@ -249,11 +251,10 @@ exploring (Plan how o) property = case how of
 type Prefix = ([(Int, Int)], Int)
 
 -- | Runs the property once.
-attempting :: Options -> IO Policy -> ((forall a. Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
+attempting :: Options -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
 attempting o choosing property = do
   made <- newIORef Nothing
-  let simulating :: forall a. Behavior a -> IO (Run a)
-      simulating act = do
+  let simulating act = do
         before <- readIORef made
         case before of
           Just _ -> throwIO (ErrorCall "explore: a property simulates only once")

@@ -37,6 +37,7 @@ data Policy = Policy
   -- ^ What is left of the schedule.
   }
 
+-- | The policy that a schedule stands for.
 policy :: Schedule -> IO Policy
 policy Undisturbed = switching True []
 policy (Switching exceptions) = switching True exceptions

@@ -130,6 +130,7 @@ instance Exception Unwind where
   toException = asyncExceptionToException
   fromException = asyncExceptionFromException
 
+-- | A simulation without tasks, on the caller's capability.
 newSim :: Options -> Policy -> IO Sim
 newSim o p = do
   (here, _) <- threadCapability =<< myThreadId

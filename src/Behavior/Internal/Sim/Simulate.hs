@@ -37,6 +37,7 @@ simulateWith o act = do
   chooser' <- policy (scheduled o)
   simulateBy o chooser' act
 
+-- | 'simulateWith', where the policy stands for the schedule.
 simulateBy :: Options -> Policy -> Behavior a -> IO (Run a)
 simulateBy o chooser' act = do
   nested <- simulator
@@ -113,7 +114,7 @@ unwind sim verdict = do
   -- It gives it back at its next operation, or at its end. If it does not come to either,
   -- what it waits in is interrupted; and if that does not help it is left behind.
   recall = do
-    returned <- soon 50
+    returned <- soon 10
     unless returned $ do
       runner <- readIORef (current sim)
       mapM_ (\thread -> forkIO (throwTo thread Unwind)) (taskThread runner)

@@ -1,0 +1,220 @@
+-- |
+-- Claims about what has happened in a mock world.
+module Behavior.Internal.Mock.Claim
+  ( Claim
+  , eventually
+  , withinSeconds
+  , never
+  , exactly
+  , always
+  , comesBefore
+  , whenever
+
+    -- * Judging
+  , holds
+  , verdict
+  ) where
+
+import Control.Applicative ((<|>))
+import Data.Char (toUpper)
+import Data.List (intercalate, isPrefixOf)
+
+import Behavior.Internal.Mock.Moment
+import Behavior.Internal.Mock.Record
+import Behavior.Internal.Runtime (Seconds)
+
+-- $setup
+-- >>> import Behavior.Sim.Mock
+-- >>> import Behavior.Internal.Mock.Record
+-- >>> let line s who = Entry s who "" 1
+-- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" AskedToStop, line 5 "drive" Stops]
+-- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
+-- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
+-- >>> let check claim = either putStr pure (verdict claim record)
+
+-- | What is said of a record. Two claims joined by '<>' hold when both do.
+--
+-- These are the patterns in which properties are mostly specified (Dwyer, Avrunin and
+-- Corbett, /Patterns in property specifications for finite-state verification/):
+-- existence, absence, bounded existence, universality, precedence and response. A
+-- record is all that happened: what is not on it has not come in time.
+--
+-- @since 0.2.0.0
+data Claim = Claim
+  { claimWords :: String
+  , claimNames :: [String]
+  , broken :: Lines -> Origin -> Maybe (String, Lines)
+  -- ^ Why it does not hold of what comes after the origin, and what entries show it.
+  }
+
+-- | The entry from which a claim is made (the beginning comes before entry 0).
+data Origin = Origin Int Seconds
+
+instance Semigroup Claim where
+  a <> b =
+    Claim (intercalate ", and " (filter (not . null) [claimWords a, claimWords b])) (claimNames a ++ claimNames b) $
+      \rows origin -> broken a rows origin <|> broken b rows origin
+
+instance Monoid Claim where
+  mempty = Claim "" [] (\_ _ -> Nothing)
+
+-- | It happens, at least once.
+--
+-- @since 0.2.0.0
+eventually :: Moment -> Claim
+eventually = withinSeconds (1 / 0)
+
+-- | It happens within so many seconds (to a microsecond): from the beginning, or
+-- under 'whenever' from then on. A negative number or NaN is refused with an
+-- 'Control.Exception.ErrorCall'.
+--
+-- >>> check (whenever (becoming "low" True) (withinSeconds 0.5 (startOf "charge")))
+-- This does not hold: whenever "low" becomes True, within 0.5 s "charge" begins.
+-- From 4.0 s on, it came only at 5.0 s:
+--     0.0 s  low: is False
+--     0.0 s  drive: begins
+--   > 4.0 s  low: becomes True
+--     4.0 s  drive: is asked to stop
+--     5.0 s  drive: has stopped
+--   > 5.0 s  charge: begins
+--     9.0 s  charge: done
+--
+-- @since 0.2.0.0
+withinSeconds :: Seconds -> Moment -> Claim
+withinSeconds limit m
+  | limit >= 0 = claimOf (term ++ momentWords m) m $ \(Origin _ since) found -> case found of
+      [] -> Just ("it never came", [])
+      row : _
+        | time row - since <= limit + 0.000001 -> Nothing
+        | otherwise -> Just ("it came only at " ++ inSeconds (time row), [row])
+  | otherwise = errorWithoutStackTrace ("withinSeconds: a limit is zero or more seconds, not " ++ show limit)
+ where
+  term
+    | limit == 1 / 0 = "eventually "
+    | otherwise = "within " ++ inSeconds limit ++ " "
+
+-- | It does not happen.
+--
+-- @since 0.2.0.0
+never :: Moment -> Claim
+never m = claimOf ("never " ++ momentWords m) m $ \_ found -> case found of
+  [] -> Nothing
+  row : _ -> Just ("it was so at " ++ inSeconds (time row), [row])
+
+-- | It happens exactly so many times.
+--
+-- @since 0.2.0.0
+exactly :: Int -> Moment -> Claim
+exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords m) m $ \_ found ->
+  if length found == times then Nothing else Just ("it was so " ++ show (length found) ++ " times", found)
+
+-- | It goes on all the time: whenever anything happens.
+--
+-- >>> holds (whenever (startOf "charge") (always (being "low" True))) record
+-- True
+--
+-- @since 0.2.0.0
+always :: Stretch -> Claim
+always s = Claim ("always " ++ spanWords s) (spanNames s) $ \rows (Origin origin _) ->
+  let isInside n = any (\(from, to) -> from <= n && n < to) (stretches s rows)
+   in case [row | row@(n, entry) <- rows, n > origin, not (setting entry || isInside n)] of
+        [] -> Nothing
+        row : _ -> Just ("it was not so at " ++ inSeconds (time row), [row])
+ where
+  -- While the world is being set up, not all of it is there yet.
+  setting entry = case happening entry of
+    Is _ -> True
+    _ -> False
+
+-- | The second does not happen before the first has: @startOf "look" \`comesBefore\`
+-- startOf "cross"@. It holds when the second never happens.
+--
+-- >>> check (startOf "charge" `comesBefore` endOf "drive")
+-- This does not hold: "charge" begins before "drive" ends.
+-- The second came at 5.0 s, without the first:
+--     ...
+--     4.0 s  low: becomes True
+--     4.0 s  drive: is asked to stop
+--   > 5.0 s  drive: has stopped
+--     5.0 s  charge: begins
+--     9.0 s  charge: done
+--
+-- @since 0.2.0.0
+comesBefore :: Moment -> Moment -> Claim
+comesBefore a b =
+  Claim (momentWords a ++ " before " ++ momentWords b) (momentNames a ++ momentNames b) $ \rows (Origin origin _) ->
+    let after m = filter ((> origin) . fst) (occurrences m rows)
+     in case (after a, after b) of
+          (_, []) -> Nothing
+          ((n, _) : _, (k, _) : _) | n < k -> Nothing
+          (_, row : _) -> Just ("the second came at " ++ inSeconds (time row) ++ ", without the first", [row])
+
+infix 7 `comesBefore`
+
+-- | Each time that it happens, the claim holds of what comes after.
+--
+-- > whenever (becoming "low" True) (eventually (startOf "charge"))
+-- > whenever (becoming "low" True) (withinSeconds 2 (startOf "charge"))
+-- > whenever (faultOf "motor") (never (startOf "drive"))
+--
+-- @since 0.2.0.0
+whenever :: Moment -> Claim -> Claim
+whenever m claim =
+  Claim words' (momentNames m ++ claimNames claim) $ \rows (Origin origin _) ->
+    case [ ("from " ++ inSeconds (time row) ++ " on, " ++ why, row : seen)
+         | row@(n, _) <- occurrences m rows
+         , n > origin
+         , Just (why, seen) <- [broken claim rows (Origin n (time row))]
+         ] of
+      [] -> Nothing
+      first : _ -> Just first
+ where
+  words' = "whenever " ++ momentWords m ++ ", " ++ claimWords claim
+
+claimOf :: String -> Moment -> (Origin -> Lines -> Maybe (String, Lines)) -> Claim
+claimOf words' m judge = Claim words' (momentNames m) $ \rows origin@(Origin after _) ->
+  judge origin (filter ((> after) . fst) (occurrences m rows))
+
+time :: (Int, Entry) -> Seconds
+time = happenedAt . snd
+
+-- | Whether a claim holds, to be said as hspec says it:
+-- @record \`shouldSatisfy\` holds claim@. ('Behavior.Sim.Mock.shouldRecord' says why
+-- it does not.)
+--
+-- @since 0.2.0.0
+holds :: Claim -> Record -> Bool
+holds claim = either (const False) (const True) . verdict claim
+
+-- | Why a claim does not hold, with the lines of the record that show it.
+--
+-- A claim about a name that nothing in the world bears does not hold: else a slip of
+-- the pen would make 'never' true.
+--
+-- >>> check (never (startOf "chrage"))
+-- This does not hold: never "chrage" begins.
+-- Nothing in this world is called "chrage", only "low", "drive", "charge".
+--
+-- @since 0.2.0.0
+verdict :: Claim -> Record -> Either String ()
+verdict claim record = case (strangers, broken claim (numbered record) (Origin (-1) 0)) of
+  (name : _, _) ->
+    refuted ("Nothing in this world is called " ++ show name ++ ", only " ++ commas (map show (subjects record)) ++ ".") []
+  ([], Just (why, seen)) -> refuted (capital why ++ if null (entries record) then "." else ":") (excerpt (map fst seen) (entries record))
+  ([], Nothing) -> Right ()
+ where
+  strangers = [name | name <- claimNames claim, not (any (`names` name) (subjects record))]
+  names known name = known == name || (known ++ " ") `isPrefixOf` name
+  commas = intercalate ", "
+  refuted why shown = Left (unlines (("This does not hold: " ++ claimWords claim ++ ".") : why : shown))
+  capital why = map toUpper (take 1 why) ++ drop 1 why
+
+-- | The lines that show something, marked, each with a few around it; when none
+-- does, the last ones.
+excerpt :: [Int] -> [Entry] -> [String]
+excerpt seen rows = gaps 0 [(n, marked n line) | (n, line) <- zip [0 ..] (timeline rows), near n]
+ where
+  near n = any (\k -> abs (n - k) <= 2) (if null seen then [length rows - 3] else seen)
+  marked n line = (if n `elem` seen then "  > " else "    ") ++ line
+  gaps next [] = ["    ..." | next < length rows]
+  gaps next ((n, line) : others) = ["    ..." | n > next] ++ line : gaps (n + 1) others

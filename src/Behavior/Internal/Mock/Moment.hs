@@ -1,0 +1,254 @@
+-- |
+-- What can be pointed at in a record: moments, and what goes on for a while.
+module Behavior.Internal.Mock.Moment
+  ( Lines
+  , numbered
+
+    -- * Moments
+  , Moment (..)
+  , startOf
+  , endOf
+  , successOf
+  , failureOf
+  , faultOf
+  , interruptionOf
+  , becoming
+  , remarked
+  , anyOf
+  , during
+  , outside
+  , overlapping
+  , count
+
+    -- * Spans
+  , Stretch (..)
+  , running
+  , being
+  ) where
+
+import Data.List (intercalate)
+import Data.Maybe (fromMaybe, listToMaybe)
+
+import Behavior.Internal.Mock.Record
+
+-- $setup
+-- >>> import Behavior.Sim.Mock
+-- >>> import Behavior.Internal.Mock.Record
+-- >>> let line s who = Entry s who "" 1
+-- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" AskedToStop, line 5 "drive" Stops]
+-- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
+-- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
+-- >>> let check claim = either putStr pure (verdict claim record)
+
+-- | The entries of a record, numbered from 0.
+type Lines = [(Int, Entry)]
+
+-- | What kind of thing may have happened, once or often: @startOf "recharge"@.
+--
+-- @since 0.2.0.0
+data Moment = Moment
+  { momentWords :: String
+  , momentNames :: [String]
+  , occurrences :: Lines -> Lines
+  }
+
+-- | The action begins. For an action with an argument the name alone means whatever
+-- argument, and @"open \\"front\\""@ that one.
+--
+-- @since 0.2.0.0
+startOf :: String -> Moment
+startOf = momentOf "begins" (== Begins)
+
+-- | The action ends, however that may be, cleanup included.
+--
+-- @since 0.2.0.0
+endOf :: String -> Moment
+endOf = momentOf "ends" isEnd
+
+-- | The action returns its result.
+--
+-- @since 0.2.0.0
+successOf :: String -> Moment
+successOf = momentOf "is done" (== Succeeds)
+
+-- | The action (or its cleanup) fails, or the sensor does.
+--
+-- @since 0.2.0.0
+failureOf :: String -> Moment
+failureOf = momentOf "fails" isFailing
+ where
+  isFailing (Fails _) = True
+  isFailing _ = False
+
+-- | The action (or its cleanup) faults, or the sensor does.
+--
+-- @since 0.2.0.0
+faultOf :: String -> Moment
+faultOf = momentOf "faults" isFaulting
+
+isFaulting :: Happening -> Bool
+isFaulting (Faults _) = True
+isFaulting _ = False
+
+-- | The action hears that it is to stop.
+--
+-- @since 0.2.0.0
+interruptionOf :: String -> Moment
+interruptionOf = momentOf "is asked to stop" (== AskedToStop)
+
+-- | The condition, or what the sensor reads, becomes this; or is this from the start.
+--
+-- @since 0.2.0.0
+becoming :: Show a => String -> a -> Moment
+becoming name value = momentOf ("becomes " ++ show value) (`elem` [Is (show value), Becomes (show value)]) name
+
+-- | Somebody has said this by 'Behavior.Sim.Mock.remark'.
+--
+-- @since 0.2.0.0
+remarked :: String -> Moment
+remarked text = (momentOf "is remarked" (== Remarked) text) {momentNames = []}
+
+momentOf :: String -> (Happening -> Bool) -> String -> Moment
+momentOf verb isIt name =
+  Moment
+    { momentWords = show name ++ " " ++ verb
+    , momentNames = [name]
+    , occurrences = filter $ \(_, entry) -> entry `isAbout` name && isIt (happening entry)
+    }
+
+isAbout :: Entry -> String -> Bool
+isAbout entry name = name `elem` [subject entry, fullName entry]
+
+isEnd :: Happening -> Bool
+isEnd what = case what of
+  Succeeds -> True
+  Fails _ -> True
+  Faults _ -> True
+  Stops -> True
+  _ -> False
+
+-- | Whichever of these.
+--
+-- >>> count (anyOf [startOf "drive", startOf "charge"]) record
+-- 2
+--
+-- @since 0.2.0.0
+anyOf :: [Moment] -> Moment
+anyOf ms =
+  Moment
+    { momentWords = intercalate " or " (map momentWords ms)
+    , momentNames = concatMap momentNames ms
+    , occurrences = \rows -> foldr (merged . (`occurrences` rows)) [] ms
+    }
+
+-- | All rows of both, each once, in order.
+merged :: Lines -> Lines -> Lines
+merged (x : xs) (y : ys) = case compare (fst x) (fst y) of
+  LT -> x : merged xs (y : ys)
+  EQ -> x : merged xs ys
+  GT -> y : merged (x : xs) ys
+merged xs ys = xs ++ ys
+
+-- | Those that happen while something goes on (after its start and before its end).
+--
+-- >>> check (never (interruptionOf "drive" `during` being "low" True))
+-- This does not hold: never "drive" is asked to stop while "low" is True.
+-- It was so at 4.0 s:
+--     ...
+--     0.0 s  drive: begins
+--     4.0 s  low: becomes True
+--   > 4.0 s  drive: is asked to stop
+--     5.0 s  drive: has stopped
+--     5.0 s  charge: begins
+--     ...
+--
+-- @since 0.2.0.0
+during :: Moment -> Stretch -> Moment
+during = restricted "while" id
+
+-- | Those that happen while something does not go on.
+--
+-- >>> holds (never (startOf "charge" `outside` being "low" True)) record
+-- True
+--
+-- @since 0.2.0.0
+outside :: Moment -> Stretch -> Moment
+outside = restricted "unless" not
+
+restricted :: String -> (Bool -> Bool) -> Moment -> Stretch -> Moment
+restricted word wanted m s =
+  Moment
+    { momentWords = momentWords m ++ " " ++ word ++ " " ++ spanWords s
+    , momentNames = momentNames m ++ spanNames s
+    , occurrences = \rows ->
+        let inside (n, _) = any (\(from, to) -> from < n && n < to) (stretches s rows)
+         in filter (wanted . inside) (occurrences m rows)
+    }
+
+-- | One begins, or both do, while the other goes on: @never (running "recharge"
+-- \`overlapping\` running "drive")@ is said of two that exclude each other. Of one
+-- and the same action it says that two calls of it run at once.
+--
+-- >>> holds (never (running "drive" `overlapping` running "charge")) record
+-- True
+--
+-- @since 0.2.0.0
+overlapping :: Stretch -> Stretch -> Moment
+overlapping a b =
+  (anyOf [starts a `during` b, starts b `during` a]) {momentWords = spanWords a ++ " while " ++ spanWords b}
+ where
+  starts s = Moment (spanWords s) (spanNames s) $ \rows ->
+    let from = map fst (stretches s rows) in filter ((`elem` from) . fst) rows
+
+infixl 8 `during`, `outside`, `overlapping`
+
+-- | How often it happened.
+--
+-- >>> count (startOf "drive") record
+-- 1
+--
+-- @since 0.2.0.0
+count :: Moment -> Record -> Int
+count m = length . occurrences m . numbered
+
+-- | The lines of a record.
+numbered :: Record -> Lines
+numbered = zip [0 ..] . entries
+
+-- | What goes on for a while.
+--
+-- @since 0.2.0.0
+data Stretch = Stretch
+  { spanWords :: String
+  , spanNames :: [String]
+  , stretches :: Lines -> [(Int, Int)]
+  -- ^ From which entry to which.
+  }
+
+-- | The action runs: from its beginning to its end, cleanup included.
+--
+-- @since 0.2.0.0
+running :: String -> Stretch
+running name =
+  Stretch (show name ++ " is running") [name] $
+    stretchesFrom (\e -> e `isAbout` name && happening e == Begins) $ \begun e ->
+      fullName e == fullName begun && call e == call begun && isEnd (happening e)
+
+-- | The condition, or what the sensor reads, is this.
+--
+-- @since 0.2.0.0
+being :: Show a => String -> a -> Stretch
+being name value =
+  Stretch (show name ++ " is " ++ show value) [name] $
+    stretchesFrom (\e -> e `isAbout` name && happening e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
+      e `isAbout` name && changes (happening e)
+ where
+  changes (Becomes _) = True
+  changes what = what == LosesItsValue
+
+stretchesFrom :: (Entry -> Bool) -> (Entry -> Entry -> Bool) -> Lines -> [(Int, Int)]
+stretchesFrom begins ends rows =
+  [ (from, fromMaybe maxBound (listToMaybe [to | (to, e) <- drop (from + 1) rows, ends entry e]))
+  | (from, entry) <- rows
+  , begins entry
+  ]

@@ -1,0 +1,147 @@
+-- |
+-- A mock world, and the record of what happens there.
+--
+-- To note something is no operation of the seam, but to ask for the time is. So what
+-- is noted right after the time was asked for, and what is done right after that, is
+-- one step of a simulation.
+module Behavior.Internal.Mock.World
+  ( Mock
+  , newMock
+  , begin
+  , remark
+
+    -- * For what is in the world
+  , clock
+  , tell
+  , christen
+  , foretell
+
+    -- * The record
+  , happened
+  , shouldRecord
+  , BrokenClaim (..)
+  ) where
+
+import Control.Concurrent.STM (STM)
+import Control.Exception (ErrorCall (..), Exception, mask_, throwIO)
+import Control.Monad (join, void, when)
+import Data.IORef
+import Data.Maybe (fromMaybe)
+
+import Behavior.Internal.Mock.Claim (Claim, verdict)
+import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Mock.Record
+import Behavior.Internal.Runtime
+
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Sim.Mock
+-- >>> mock <- newMock
+
+-- | A world in which nothing is real, and the record of what happens there. One world
+-- is for one run.
+--
+-- @since 0.2.0.0
+data Mock = Mock
+  { origin :: IORef (Maybe Seconds)
+  -- ^ When the world's clock was started.
+  , names :: IORef [String]
+  , noted :: IORef [Entry]
+  -- ^ Newest first.
+  , unseen :: IORef [Seconds -> STM [Entry]]
+  -- ^ The changes until then that were due, but that nobody has seen yet.
+  }
+
+-- | An empty world.
+--
+-- @since 0.2.0.0
+newMock :: IO Mock
+newMock = Mock <$> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
+
+-- | Starts the clock of the world, if it does not go already. Otherwise it starts
+-- when the first action begins, or a condition is looked at for the first time.
+--
+-- >>> begin mock
+--
+-- @since 0.2.0.0
+begin :: Mock -> Behavior ()
+begin = void . clock
+
+-- | When the world's clock was started, and what time it is. A scheduling point, and
+-- the only operation of the seam in here that is done just to note something.
+clock :: Mock -> IO (Seconds, Seconds)
+clock mock = do
+  t <- now
+  zero <- atomicModifyIORef' (origin mock) $ \started -> let zero = fromMaybe t started in (Just zero, zero)
+  pure (zero, t)
+
+-- | Notes, which nothing can block or interrupt where exceptions are masked.
+tell :: Mock -> Entry -> IO ()
+tell mock entry = do
+  atomicModifyIORef' (noted mock) (\old -> (entry : old, ()))
+  note (show entry)
+
+-- | Puts a remark of your own on record.
+--
+-- >>> remark mock "a sheep crosses the road"
+-- >>> mock `shouldRecord` eventually (remarked "a sheep crosses the road")
+--
+-- @since 0.2.0.0
+remark :: Mock -> String -> Behavior ()
+remark mock text = do
+  (zero, t) <- clock mock
+  mask_ $ tell mock (Entry (t - zero) text "" 1 Remarked)
+
+-- | Gives a thing of the world its name, which must not be another one's.
+christen :: Mock -> String -> String -> IO ()
+christen mock kind name = do
+  taken <- atomicModifyIORef' (names mock) $ \old ->
+    if name `elem` old then (old, True) else (name : old, False)
+  when taken . throwIO . ErrorCall $
+    kind ++ " " ++ show name ++ ": something else in this world has this name already"
+
+-- | Has changes put on record (of those that were due by a given time) that nobody
+-- has seen.
+foretell :: Mock -> (Seconds -> STM [Entry]) -> IO ()
+foretell mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
+
+-- | All that has happened until now. A change of a condition is on record once
+-- something later is, whether or not anybody has seen it.
+--
+-- >>> wave <- action mock "wave" [succeeds]
+-- >>> wave
+-- >>> map happening . entries <$> happened mock
+-- [Begins,Succeeds]
+--
+-- @since 0.2.0.0
+happened :: Mock -> IO Record
+happened mock = do
+  seen <- readIORef (noted mock)
+  conditions <- readIORef (unseen mock)
+  due <- atomically (traverse ($ maximum (0 : map happenedAt seen)) conditions)
+  known <- readIORef (names mock)
+  pure (recorded (reverse known) (reverse (join due) ++ seen))
+
+-- | Throws a 'BrokenClaim', which says why, unless the claim holds of what has
+-- happened. To be used as hspec's expectations are.
+--
+-- >>> mock `shouldRecord` eventually (remarked "all is well")
+-- *** Exception: This does not hold: eventually "all is well" is remarked.
+-- It never came.
+-- <BLANKLINE>
+--
+-- @since 0.2.0.0
+shouldRecord :: Mock -> Claim -> IO ()
+shouldRecord mock claim = happened mock >>= either (throwIO . BrokenClaim) pure . verdict claim
+
+infix 1 `shouldRecord`
+
+-- | A claim that does not hold, and why; it is shown to be read.
+--
+-- @since 0.2.0.0
+newtype BrokenClaim = BrokenClaim String
+
+instance Show BrokenClaim where
+  show (BrokenClaim why) = why
+
+instance Exception BrokenClaim

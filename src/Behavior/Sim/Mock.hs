@@ -1,0 +1,106 @@
+-- |
+-- A small kit for your own tests: a mock world of scripted actions, conditions and
+-- sensors, its record of what happened, and claims about that.
+--
+-- > it "goes to its charger before the battery is empty" $ do
+-- >   world    <- newMock
+-- >   low      <- condition world "battery low" [(0, False), (5, True)]
+-- >   tidy     <- action world "tidy up" [succeeds `taking` 30 `slowToStop` 1]
+-- >   recharge <- action world "recharge" [succeeds `taking` 20 `causing` set low False]
+-- >   _ <- simulate (Signal.monitor (signal low) recharge tidy)
+-- >   world `shouldRecord` whenever (becoming "battery low" True) (withinSeconds 2 (startOf "recharge"))
+-- >   world `shouldRecord` never (running "tidy up" `overlapping` running "recharge")
+--
+-- All of it works in a simulation, where waiting costs no time and every schedule can
+-- be tried, and on real threads as well.
+--
+-- (It is @taking@ and @comesBefore@, not @after@ and @before@, since those are hspec's.)
+module Behavior.Sim.Mock
+  ( -- * A world
+    Mock
+  , newMock
+  , begin
+  , remark
+
+    -- * What the robot does
+  , action
+  , actionOn
+  , Script
+
+    -- ** How it ends
+  , succeeds
+  , returning
+  , fails
+  , faults
+  , throws
+  , hangs
+
+    -- ** How long it takes, and what it changes
+  , taking
+  , causing
+
+    -- ** What it does when it is asked to stop
+  , slowToStop
+  , failsStopping
+  , faultsStopping
+  , completesAnyway
+
+    -- * What the robot perceives
+  , sensor
+  , condition
+  , unsteady
+  , Condition
+  , signal
+  , reading
+  , set
+  , lose
+
+    -- * What has happened
+  , shouldRecord
+  , BrokenClaim (..)
+  , happened
+  , Record (..)
+  , Entry (..)
+  , Happening (..)
+
+    -- * Claims
+  , Claim
+  , always
+  , never
+  , eventually
+  , withinSeconds
+  , comesBefore
+  , whenever
+  , exactly
+  , holds
+  , verdict
+
+    -- ** Moments
+  , Moment
+  , startOf
+  , endOf
+  , successOf
+  , failureOf
+  , faultOf
+  , interruptionOf
+  , becoming
+  , remarked
+  , anyOf
+  , during
+  , outside
+  , overlapping
+  , count
+
+    -- ** What goes on for a while
+  , Stretch
+  , running
+  , being
+  ) where
+
+import Behavior.Internal.Mock.Claim
+import Behavior.Internal.Mock.Condition
+import Behavior.Internal.Mock.Action
+import Behavior.Internal.Mock.Moment
+import Behavior.Internal.Mock.Record
+import Behavior.Internal.Mock.Script
+import Behavior.Internal.Mock.World

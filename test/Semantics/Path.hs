@@ -1,0 +1,114 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Paths of the relation: whether a timeline is one, and which there are.
+module Semantics.Path
+  ( -- * Is it a path?
+    Seen (..)
+  , End (..)
+  , explains
+  , Verdict (..)
+
+    -- * All paths
+  , paths
+  ) where
+
+import Control.Monad (foldM)
+import qualified Data.Map.Strict as Map
+import Data.Maybe (mapMaybe)
+import Data.Set (Set)
+import qualified Data.Set as Set
+
+import Semantics.Program
+import Semantics.Step
+
+-- | What could be seen of a run, and how it ended.
+data Seen = Seen
+  { timeline :: Timeline
+  , end :: End
+  }
+  deriving (Eq, Ord, Show)
+
+data End
+  = Gave Ticks Result
+  | -- | Nothing can happen any more, and time does not help.
+    Deadlock
+  | -- | Nobody waited for the end.
+    Unknown
+  deriving (Eq, Ord, Show)
+
+data Verdict
+  = Possible
+  | -- | The timeline is none of the relation from the given event on; this is what was
+    -- possible instead.
+    Impossible Timeline [(Ticks, Event)]
+  | -- | No path ends so.
+    ImpossibleEnd [End]
+  | -- | There were more states to look at than fuel.
+    OutOfFuel
+  deriving (Eq, Show)
+
+-- | Whether a run of the world may have been seen so.
+explains :: Int -> World -> Seen -> Verdict
+explains fuel world seen = go (Set.singleton (initial world)) (timeline seen)
+ where
+  go states = \case
+    [] -> case (end seen, silently fuel (upTo (end seen)) states) of
+      (Unknown, _) -> Possible
+      (_, Nothing) -> OutOfFuel
+      (_, Just these)
+        | end seen `elem` ends' -> Possible
+        | otherwise -> ImpossibleEnd ends'
+       where
+        ends' = mapMaybe endOf (Set.toList these)
+    rest@((t, event) : later) -> case still t of
+      Nothing -> OutOfFuel
+      Just these -> case [s' | s <- at t these, (e, s') <- step s, e == event] of
+        [] -> Impossible rest [(clock (now s), e) | s <- Set.toList these, (e, _) <- step s, e /= Silent]
+        next -> go (Set.fromList next) later
+   where
+    still t = silently fuel (Just t) states
+  upTo = \case
+    Gave t _ -> Just t
+    _ -> Nothing
+  at t = filter ((== t) . clock . now) . Set.toList
+
+-- | Every timeline that the relation allows, with its end. Nothing: more than fuel.
+paths :: Int -> World -> Maybe (Set Seen)
+paths fuel world = Set.fromList <$> go [] (Set.singleton (initial world))
+ where
+  go past states = do
+    these <- silently fuel Nothing states
+    let ends' = Set.fromList (mapMaybe endOf (Set.toList these))
+        next =
+          Map.fromListWith Set.union $
+            [((clock (now s), e), Set.singleton s') | s <- Set.toList these, (e, s') <- step s, e /= Silent]
+        here = [Seen {timeline = reverse past, end = e} | e <- Set.toList ends']
+    foldM
+      (\found (seen, states') -> do
+          more <- go (seen : past) states'
+          if length found > fuel then Nothing else Just (more ++ found))
+      here
+      (Map.toList next)
+
+-- | All states that are reached without anything to see, up to a moment.
+silently :: Int -> Maybe Ticks -> Set State -> Maybe (Set State)
+silently fuel limit states = go states (Set.toList states)
+ where
+  go known = \case
+    [] -> Just known
+    s : others
+      | Set.size known > fuel -> Nothing
+      | otherwise ->
+          let new = filter (`Set.notMember` known) (quietly s)
+           in go (foldr Set.insert known new) (new ++ others)
+  quietly s = case step s of
+    [] | Just later <- pass s, maybe True (clock (now later) <=) limit -> [later]
+    next -> [s' | (Silent, s') <- next]
+
+-- | How the run ended, if it has.
+endOf :: State -> Maybe End
+endOf s = case running s of
+  Over r -> Just (Gave (clock (now s)) r)
+  _ | null (step s), Nothing <- pass s -> Just Deadlock
+  _ -> Nothing

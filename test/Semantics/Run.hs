@@ -1,0 +1,217 @@
+{-# LANGUAGE LambdaCase #-}
+{-# LANGUAGE RankNTypes #-}
+
+-- |
+-- A program of the specification, as a behaviour on the library's own operators.
+module Semantics.Run
+  ( observed
+  , allObserved
+  ) where
+
+import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, retry, throwSTM, writeTVar)
+import Control.Exception
+  ( ErrorCall (..)
+  , Exception (..)
+  , SomeException
+  , mask
+  , throwIO
+  , try
+  , uninterruptibleMask_
+  )
+import Control.Monad (void)
+import Data.Foldable (for_)
+import Data.IORef
+import Data.Map.Strict (Map)
+import qualified Data.Map.Strict as Map
+import Data.Set (Set)
+import qualified Data.Set as Set
+
+import Behavior.Internal.Failure hiding (Failed (..))
+import Behavior.Internal.Parallel
+import Behavior.Internal.Reactive
+import Behavior.Internal.Runtime hiding (Event (..))
+import Behavior.Internal.Sensor
+import Behavior.Internal.Scope (StoppedWithFault (..))
+import Behavior.Internal.Source (watching)
+import Behavior.Internal.Time
+import Behavior.Sim
+  ( Did (Says)
+  , Options (endAt, scheduled, standstill)
+  , Plan (..)
+  , Report (complete)
+  , Run (finished, outcome)
+  , Schedule
+  , Search (Exhaustive)
+  , Step (Step, at, did)
+  , defaults
+  , explore
+  , simulateWith
+  )
+import qualified Behavior.Sim as Sim
+import Semantics.Path (End (..), Seen (..))
+import Semantics.Program
+
+-- | Simulates the world's program under a schedule, and gives what could be seen; or
+-- says why there was no end to see.
+observed :: Schedule -> World -> IO (Either String Seen)
+observed how = observing (simulateWith limits {scheduled = how})
+
+-- | Simulates the world's program under all schedules with up to so many pre-emptions,
+-- but under no more schedules than the second number, and gives all that could be seen
+-- and whether those were all the schedules.
+allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
+allObserved preemptions most world = do
+  found <- newIORef Set.empty
+  report <- explore (Plan (Exhaustive preemptions most) limits) $ \simulated ->
+    observing simulated world >>= \seen -> modifyIORef' found (Set.insert seen)
+  found' <- readIORef found
+  pure (found', complete report)
+
+-- | A run without an end is cut short.
+limits :: Options
+limits = defaults {standstill = 20000, endAt = 60}
+
+observing :: (forall a. Behavior a -> IO (Run a)) -> World -> IO (Either String Seen)
+observing simulated world = do
+  happened <- newIORef []
+  -- In the record of the run is when it happened.
+  let tell event = modifyIORef' happened (event :) >> note (show event)
+  run <- simulated (behavior tell world)
+  events <- reverse <$> readIORef happened
+  let record = zip [ticks (at s) | s@Step {did = Says _} <- Sim.steps run] events
+      seen e = Right Seen {timeline = record, end = e}
+      gave = seen . Gave (ticks (finished run))
+  pure $ case outcome run of
+    Sim.Returned value -> gave (Succeeded value)
+    Sim.Failing e -> gave (thrown e)
+    Sim.Faulting e -> gave (thrown e)
+    Sim.Cancelled e -> gave (thrown e)
+    Sim.Deadlock _ -> seen Deadlock
+    Sim.OutOfTime -> seen Unknown
+    Sim.Livelock labels -> Left ("livelock: " ++ show labels)
+    Sim.Outside label _ -> Left ("outside: " ++ show label)
+    Sim.Meddled waiting -> Left ("meddled: " ++ show waiting)
+    Sim.TooSlow label -> Left ("too slow: " ++ show label)
+    Sim.Misfit why -> Left ("misfit: " ++ why)
+ where
+  ticks = round
+
+-- | Where a program acts: what the conditions are at, how often actions were called,
+-- and where to fork.
+data Stage = Stage
+  { levels :: Map Condition (TVar Level)
+  , calls :: IORef (Map Name Int)
+  , forking :: Behavior Value -> Behavior ()
+  }
+
+-- | The world's program and environment. What can be seen is told to the given
+-- action, which must not be a scheduling point.
+behavior :: (Event -> IO ()) -> World -> Behavior Value
+behavior tell world = do
+  stage <- Stage <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure noNursery
+  firstOf [play tell stage (program world), environment stage]
+ where
+  environment stage = do
+    for_ (changes world) $ \(Change when condition level) -> do
+      sleepUntil (fromIntegral when)
+      for_ (Map.lookup condition (levels stage)) $ \var -> atomically (writeTVar var level)
+      tell (condition `Becomes` level)
+    sleepUntil (fromIntegral (patience world))
+    pure timeIsUp
+  noNursery _ = throwIO (ErrorCall "a fork outside every scope")
+
+play :: (Event -> IO ()) -> Stage -> Program -> Behavior Value
+play tell stage = go
+ where
+  go :: Program -> Behavior Value
+  go = \case
+    Do name scripts -> do
+      checkpoint
+      n <- atomicModifyIORef' (calls stage) $ \counts ->
+        let n = Map.findWithDefault 0 name counts in (Map.insert name (n + 1) counts, n)
+      act (\deed -> tell (name `Does` deed)) name (scripts !! min n (length scripts - 1))
+    Pure value -> pure value
+    Then first second -> go first >> go second
+    Else first second -> go first ? go second
+    Attempt n p -> attempt n (go p)
+    FallbackOver ps -> fallbackOver ps go
+    Parallel left right -> Unit <$ parallel (go left) (go right)
+    Both left right -> Unit <$ both (go left) (go right)
+    FirstOf ps -> firstOf (map go ps)
+    AllOf ps -> Several <$> allOf (map go ps)
+    RSelect signal left right -> rSelect (holds <$> level signal) (go left) (go right)
+    Monitor signal recovery task -> monitor (holds <$> level signal) (void (go recovery)) (go task)
+    Switch signal branches -> switch (level signal) (\n -> go (branches !! max 0 (min n (length branches - 1))))
+    TeleoReactive rules -> teleoReactive [(holds <$> level signal, go p) | (signal, p) <- rules]
+    WaitUntil signal -> Unit <$ waitUntil (holds <$> level signal)
+    WhileHolding signal p -> whileHolding (holds <$> level signal) (go p)
+    Timeout limit p -> timeout (fromIntegral limit) (go p)
+    Scoped body -> scoped (\nursery -> play tell stage {forking = void . fork nursery} body)
+    Fork p -> Unit <$ forking stage (go p)
+  level = \case
+    Watched condition -> watching (reading condition)
+    Polled every p -> number <$> polling (fromIntegral every) (go p)
+  reading :: Condition -> STM Int
+  reading condition = case Map.lookup condition (levels stage) of
+    Nothing -> retry
+    Just var ->
+      readTVar var >>= \case
+        At n -> pure n
+        Lost -> retry
+        Failing -> throwSTM (Failure condition)
+        Faulting -> throwSTM (Fault condition)
+
+-- | One call of an action.
+act :: (Deed -> IO ()) -> Name -> Script -> Behavior Value
+act tell name script = do
+  tell Begins
+  mask $ \restore ->
+    try (inState restore (wait (takes script))) >>= \case
+      Right () -> finish name (ends script)
+      Left e
+        | not (isCancellation e) -> throwIO e
+        | otherwise -> do
+            tell Hears
+            case whenAsked script of
+              StopsAtOnce -> throwIO e
+              StopsAfter n -> clean n >> tell Stops >> throwIO e
+              EndsAfter n how -> clean n >> finish (cleanupOf name) how
+ where
+  inState restore = case masking script of
+    Unmasked -> restore
+    Masked -> id
+    Uninterruptible -> uninterruptibleMask_
+  finish :: Name -> Ending -> IO Value
+  finish who how = do
+    tell (Ends how)
+    case how of
+      Succeeds n -> pure (Number n)
+      Fails -> throwIO (Failure who)
+      Faults -> throwIO (Fault who)
+  clean n = uninterruptibleMask_ (wait n)
+  -- Also what takes no time can be interrupted by others, or be overtaken by them.
+  wait n = if n > 0 then sleep (fromIntegral n) else checkpoint
+
+-- | An exception that the run ended with, as a result.
+thrown :: SomeException -> Result
+thrown e
+  | Just (StoppedWithFault _ fault) <- fromException e = Stopped (Just (show fault))
+  | isCancellation e = Stopped Nothing
+  | isFailure e = Failed (show e)
+  | otherwise = Faulted (show e)
+
+newtype Failure = Failure Name
+
+instance Show Failure where
+  show (Failure name) = name
+
+instance Exception Failure where
+  toException = behaviorFailedToException
+  fromException = behaviorFailedFromException
+
+newtype Fault = Fault Name
+
+instance Show Fault where
+  show (Fault name) = name
+
+instance Exception Fault

@@ -1,0 +1,184 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- The library against its specification: "Semantics.Step" says what may happen, and
+-- whatever does happen in a simulation must be that.
+module SemanticsSpec (spec) where
+
+import Data.List (intercalate)
+import qualified Data.Set as Set
+import Test.Hspec
+import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
+import Test.QuickCheck
+
+import Behavior.Sim (Schedule (..))
+import Semantics.Generate
+import Semantics.Path
+import Semantics.Program
+import Semantics.Run
+
+spec :: Spec
+spec = do
+  describe "The relation" relation
+  describe "The library" library
+
+-- | More programs than these are tried by @--qc-max-success@.
+library :: Spec
+library = do
+  modifyMaxSuccess (max 3000) $
+    prop "does in a simulation only what the relation allows" $
+      forAllBlind ((,) <$> worlds 4 <*> arbitrary) $ \(world, seed) -> ioProperty $ do
+        found <- judge world seed
+        message <- case found of
+          Wrong _ -> smallest world seed
+          _ -> pure ""
+        pure
+          . cover 60 (depth (program world) >= 4) "nested four deep"
+          . cover 99 (found /= Undecided) "decided"
+          . counterexample message
+          $ found `elem` [Fine, Undecided]
+  modifyMaxSuccess (const 60) $
+    prop "can do all that the relation allows" $
+      forAllShrink smallWorlds shrinkWorld $ \world -> ioProperty $ do
+        found <- compared world
+        pure
+          . cover 90 (found /= Undecided) "decided"
+          . counterexample (show found)
+          $ found `elem` [Fine, Undecided]
+
+data Judgement
+  = Fine
+  | Wrong String
+  | -- | There was more to look at than we have the patience for.
+    Undecided
+  deriving (Eq, Show)
+
+-- | Simulates the world under the schedule of the seed, and judges what could be seen.
+judge :: World -> Int -> IO Judgement
+judge world seed =
+  observed (Seeded seed) world >>= \case
+    Left why -> pure (Wrong why)
+    Right seen -> pure $ case explains 4000 world seen of
+      Possible -> Fine
+      OutOfFuel -> Undecided
+      Impossible at instead -> Wrong (told seen ++ "\nimpossible from here on:\n" ++ rows at ++ "\npossible are:\n" ++ rows instead)
+      ImpossibleEnd instead -> Wrong (told seen ++ "\nthe end is impossible; possible are:\n" ++ unlines (map show instead))
+ where
+  told seen = "under schedule " ++ show seed ++ "\n" ++ rows (timeline seen) ++ "\n" ++ show (end seen)
+  rows events = intercalate "\n" ["  " ++ show t ++ "  " ++ show e | (t, e) <- events]
+
+-- | A small world that goes wrong, for one that does. Each is tried under many
+-- schedules, since a smaller world needs another one.
+smallest :: World -> Int -> IO String
+smallest world seed = wrongly world >>= maybe (pure "") (go world)
+ where
+  go small why = firstJust [fmap ((,) w) <$> wrongly w | w <- shrinkWorld small] >>= maybe (pure (show small ++ "\n" ++ why)) (uncurry go)
+  wrongly w =
+    firstJust
+      [ (\case Wrong why -> Just why; _ -> Nothing) <$> judge w s
+      | s <- seed : [1 .. 40]
+      ]
+  firstJust = \case
+    [] -> pure Nothing
+    act : acts -> act >>= maybe (firstJust acts) (pure . Just)
+
+-- | Compares all that can be seen in simulations of the world with all that the relation
+-- allows. The search goes on until all that is allowed was seen, or all schedules were.
+compared :: World -> IO Judgement
+compared world = maybe (pure Undecided) (\these -> go (Set.map Right these) Set.empty searches) (paths 500 world)
+ where
+  searches = [allObserved k 2000 world | k <- [0 .. 3]] ++ [sampled, allObserved maxBound 20000 world]
+  sampled = (\found -> (Set.fromList found, False)) <$> traverse (\seed -> observed (Seeded seed) world) [1 .. 2000]
+  go _ _ [] = pure Undecided
+  go allowed seen (search : others) = do
+    (found, complete) <- search
+    let sofar = Set.union seen found
+        surplus = sofar `Set.difference` allowed
+        missing = allowed `Set.difference` sofar
+    case (Set.toList surplus, Set.toList missing) of
+      (wrong : _, _) -> pure (Wrong ("not allowed: " ++ show wrong))
+      ([], []) -> pure Fine
+      ([], wrong : _)
+        | null others && complete -> pure (Wrong ("allowed, and never seen: " ++ show wrong))
+        | otherwise -> go allowed sofar others
+
+-- | What must come of some programs, worked out by hand.
+relation :: Spec
+relation = do
+  describe "Sequence, and what to do about failure" $ do
+    it "runs the second when the first fails, and not when it faults" $ do
+      (act "a" 1 Fails `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
+      (act "a" 1 Faults `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 1 (Faulted "a")]
+    it "throws the last failure of several attempts" $ do
+      Attempt 2 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 3 (Failed "a")]
+      Attempt 3 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 6 (Succeeded (Number 7))]
+      Attempt 0 (act "a" 1 (Succeeds 7)) `endsIn` [Gave 0 (Failed nothingElse)]
+      FallbackOver [] `endsIn` [Gave 0 (Failed nothingElse)]
+
+  describe "Several at once" $ do
+    it "ends with the first to finish" $
+      Parallel (act "a" 1 (Succeeds 0)) (act "b" 2 Faults) `endsIn` [Gave 1 (Succeeded Unit)]
+    it "may see either first when they finish at the same time" $
+      Parallel (act "a" 1 (Succeeds 0)) (act "b" 1 Fails) `endsIn` [Gave 1 (Succeeded Unit), Gave 1 (Failed "b")]
+    it "throws the leftmost fault, not the first" $
+      FirstOf [act "a" 1 Fails, stoppedBy (EndsAfter 3 Faults) "b", stoppedBy (EndsAfter 1 Faults) "c"]
+        `endsIn` [Gave 4 (Faulted (cleanupOf "b"))]
+    it "waits for all, or for the first that fails" $ do
+      AllOf [act "a" 2 (Succeeds 1), act "b" 1 (Succeeds 2)] `endsIn` [Gave 2 (Succeeded (Several [Number 1, Number 2]))]
+      AllOf [act "a" 2 (Succeeds 1), act "b" 1 Fails] `endsIn` [Gave 1 (Failed "b")]
+      Both (act "a" 2 Fails) (stoppedBy (StopsAfter 3) "b") `endsIn` [Gave 5 (Failed "a")]
+    it "stops what was forked when the body ends, and all when that fails" $ do
+      Scoped (Fork (stoppedBy (StopsAfter 2) "a") `Then` act "b" 1 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
+      Scoped (Fork (act "a" 1 Fails) `Then` stoppedBy (StopsAfter 2) "b") `endsIn` [Gave 3 (Failed "a")]
+
+  describe "Being asked to stop" $ do
+    it "keeps the result of what completed although it was asked to stop" $
+      Timeout 1 (stoppedBy (EndsAfter 2 (Succeeds 7)) "a") `endsIn` [Gave 3 (Succeeded (Number 7))]
+    it "throws the fault of a cleanup" $
+      Timeout 1 (stoppedBy (EndsAfter 2 Faults) "a") `endsIn` [Gave 3 (Faulted (cleanupOf "a"))]
+    it "throws the fault of a cleanup through several operators" $
+      Timeout 1 (Parallel (stoppedBy StopsAtOnce "a") (Timeout 5 (stoppedBy (EndsAfter 2 Faults) "b")))
+        `endsIn` [Gave 3 (Faulted (cleanupOf "b"))]
+    it "waits for what hears nothing" $
+      Timeout 1 (Do "a" [(script 4 (Succeeds 7)) {masking = Uninterruptible}] `Then` act "b" 1 (Succeeds 0))
+        `endsIn` [Gave 4 (Failed (timedOut 1))]
+
+  describe "Conditions that change" $ do
+    it "latches what a monitor has seen" $
+      with [Change 2 "p" (At 1), Change 3 "p" (At 0)] (Monitor (Watched "p") (act "r" 2 (Succeeds 0)) (Do "t" [(script 10 (Succeeds 7)) {whenAsked = StopsAfter 2}]))
+        `does` [ (0, "t" `Does` Begins)
+               , (2, Becomes "p" (At 1))
+               , (2, "t" `Does` Hears)
+               , (3, Becomes "p" (At 0))
+               , (4, "t" `Does` Stops)
+               , (4, "r" `Does` Begins)
+               , (6, "r" `Does` Ends (Succeeds 0))
+               , (6, "t" `Does` Begins)
+               , (16, "t" `Does` Ends (Succeeds 7))
+               ]
+    it "runs the recovery although a cleanup has failed, and throws that after it" $
+      with [Change 1 "p" (At 1)] (Monitor (Watched "p") (act "r" 2 (Succeeds 0)) (stoppedBy (EndsAfter 1 Fails) "t"))
+        `endsWith` [Gave 4 (Failed (cleanupOf "t"))]
+    it "reads again after a branch was stopped" $
+      with [Change 1 "p" (At 1), Change 2 "p" (At 0)] (RSelect (Watched "p") (act "l" 1 (Succeeds 1)) (Do "r" [(script 3 (Succeeds 2)) {whenAsked = StopsAfter 2}]))
+        `endsWith` [Gave 6 (Succeeded (Number 2))]
+    it "is not false when it is lost" $ do
+      with [Change 1 "p" Lost] (RSelect (Watched "p") (act "l" 3 (Succeeds 1)) (act "r" 3 (Succeeds 2)))
+        `endsWith` [Gave 1 (Failed noValue)]
+      with [Change 1 "p" Faulting] (WhileHolding (Watched "p") (act "a" 3 (Succeeds 1)) `Else` WaitUntil (Watched "p"))
+        `endsWith` [Gave 1 (Faulted "p")]
+    it "skips the slots that a slow reading has missed" $
+      WaitUntil (Polled 2 (Do "s" [script 0 (Succeeds 0), script 3 (Succeeds 0), script 0 (Succeeds 1)]))
+        `endsIn` [Gave 6 (Succeeded Unit)]
+    it "decides on a reading that began after it asked" $
+      RSelect (Polled 2 (Do "s" [script 0 (Succeeds 1), script 1 (Succeeds 0), script 1 (Succeeds 1)])) (Do "l" [(script 9 (Succeeds 1)) {whenAsked = StopsAfter 2}, script 1 (Succeeds 2)]) (act "r" 9 (Succeeds 3))
+        `endsIn` [Gave 8 (Succeeded (Number 2))]
+ where
+  act name n how = Do name [script n how]
+  script n how = Script n how Unmasked StopsAtOnce
+  -- Takes longer than anything else.
+  stoppedBy response name = Do name [(script 50 (Succeeds 0)) {whenAsked = response}]
+  with changes' p = World {conditions = [("p", At 0)], changes = changes', patience = 100, program = p}
+  endsIn p = endsWith (with [] p)
+  endsWith world ends' = fmap (Set.map end) (paths 10000 world) `shouldBe` Just (Set.fromList ends')
+  does world events = fmap (Set.map timeline) (paths 10000 world) `shouldBe` Just (Set.singleton events)

@@ -1,0 +1,137 @@
+-- |
+-- Many schedules of one behaviour.
+module Sim.ExploreSpec (spec) where
+
+import Control.Concurrent.STM (modifyTVar', newTVarIO, readTVar, readTVarIO, retry, writeTVar)
+import Control.Exception hiding (Deadlock)
+import Control.Monad (unless, void, when)
+import Data.IORef
+import Data.List (isInfixOf, nub, sort)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Internal.Runtime (note)
+import Behavior.Sim
+import Behavior.Time (atomically, checkpoint)
+import Support hiding (note)
+
+spec :: Spec
+spec = guarded $ do
+  describe "A random exploration" random
+  describe "An exhaustive exploration" exhaustive
+  describe "A counterexample" counterexample
+  describe "A property" properties
+
+-- | Two robots count to two, and forget that the other one does.
+counting :: Int -> (Behavior () -> IO (Run ())) -> IO ()
+counting n simulateIt = do
+  counter <- newTVarIO (0 :: Int)
+  _ <- simulateIt $ do
+    let count = do
+          seen <- atomically (readTVar counter)
+          note ("saw " ++ show seen)
+          atomically (writeTVar counter (seen + 1))
+        counters = foldr both (pure ()) (replicate n count)
+    counters
+  counted <- readTVarIO counter
+  unless (counted == n) $ throwIO (Fault ("counted " ++ show counted))
+
+random :: Spec
+random = do
+  it "runs as many schedules as it is told" $ do
+    runs <- newIORef (0 :: Int)
+    report <- explore (randomly 123) $ \run -> modifyIORef runs (+ 1) >> void (run (both (sleep 1) (sleep 1)))
+    (,) (schedules report) <$> readIORef runs `shouldReturn` (123, 123)
+  it "finds a defect that needs one pre-emption" $ do
+    found <- exploring (randomly 1000) (counting 2)
+    either (const "found") show found `shouldBe` "found"
+  it "is the same for the same seed, and another for another" $ do
+    let from seed = do
+          seen <- newIORef []
+          _ <- explore (Plan (Random 20 seed) defaults) $ \run -> do
+            made <- run (both (sleep 1) (both (sleep 1) (sleep 1)))
+            modifyIORef seen (show (schedule made) :)
+          readIORef seen
+    one <- from 1
+    from 1 `shouldReturn` one
+    from 2 >>= (`shouldNotBe` one)
+
+exhaustive :: Spec
+exhaustive = do
+  it "runs every order of what does not wait" $ do
+    -- Three branches of one step each, and all the orders of these.
+    orders <- newIORef []
+    report <- explore (exhaustively 2) $ \run -> do
+      order <- newTVarIO ""
+      let write name = atomically (modifyTVar' order (name :))
+      _ <- run (both (both (write 'a') (write 'b')) (write 'c'))
+      readTVarIO order >>= \o -> modifyIORef orders (o :)
+    complete report `shouldBe` True
+    sort . nub <$> readIORef orders `shouldReturn` ["abc", "acb", "bac", "bca", "cab", "cba"]
+  it "runs no schedule twice" $ do
+    seen <- newIORef []
+    _ <- explore (exhaustively 2) $ \run -> do
+      made <- run (both (sleep 1 >> checkpoint) (sleep 1))
+      modifyIORef seen (show (schedule made) :)
+    all' <- readIORef seen
+    length (nub all') `shouldBe` length all'
+  it "finds nothing with fewer pre-emptions than a defect needs" $ do
+    let undisturbed k = either (const False) complete <$> exploring (exhaustively k) (counting 2)
+    (,) <$> undisturbed 0 <*> undisturbed 1 `shouldReturn` (True, False)
+  it "says so when there are more schedules than it may run" $ do
+    report <- explore (Plan (Exhaustive 3 50) defaults) $ \run -> void (run (both (sleep 1) (sleep 1)))
+    (schedules report, complete report) `shouldBe` (50, False)
+
+counterexample :: Spec
+counterexample = do
+  it "is shrunk to as few switches as it takes" $ do
+    found <- exploring (randomly 1000) (counting 3)
+    case found of
+      Left c | Switching s <- failing c -> length s `shouldBe` 1
+      _ -> expectationFailure "it should have been found"
+  it "fails again when it is replayed from its text" $ do
+    found <- exploring (randomly 1000) (counting 3)
+    case found of
+      Left c -> do
+        let text = drop (length "to see it again: explore (replaying (") (last (lines (show c)))
+            printed = take (length text - 2) text
+        again <- exploring (replaying (read printed)) (counting 3)
+        either (show . because) (const "it held") again `shouldBe` show (because c)
+      Right _ -> expectationFailure "it should have been found"
+  it "tells what happened, with times and threads" $ do
+    found <- exploring (randomly 1000) (counting 2)
+    case found of
+      Left c -> do
+        show c `shouldContain` "Fault \"counted 1\""
+        show c `shouldContain` "shrunk to one switch"
+        [words line | line <- lines (show c), "saw" `isInfixOf` line]
+          `shouldBe` [ ["0.000", "s", "1", "both:", "left", "saw", "0"]
+                     , ["0.000", "s", "3", "both:", "left", "saw", "0"]
+                     ]
+      Right _ -> expectationFailure "it should have been found"
+  it "of a deadlock tells who waited" $ do
+    found <- exploring (randomly 100) $ \run -> do
+      made <- run (both (pure ()) (atomically retry :: Behavior ()))
+      case outcome made of
+        Returned () -> pure ()
+        other -> fail (explain other)
+    either show show found `shouldSatisfy` ("both: right waits for a transaction" `isInfixOf`)
+
+properties :: Spec
+properties = do
+  it "need not simulate" $ schedules <$> explore (randomly 3) (const (pure ())) `shouldReturn` 3
+  it "simulates only once" $ do
+    found <- exploring (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
+    either (show . because) show found `shouldBe` "explore: a property simulates only once"
+  it "is told of a run that is none" $ do
+    found <- exploring (Plan (Random 1 0) defaults {patience = 0.1}) $ \run ->
+      void (run (mapM_ (evaluate . length . show) [0 :: Int ..]))
+    either (show . because) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
+  it "that throws a cancellation ends the exploration" $ do
+    end <- ending (schedules <$> explore (randomly 3) (\_ -> throwIO (Cancel "user")))
+    end `shouldBe` CancelledBy (show (Cancel "user"))
+  it "of a schedule that does not fit is told why" $ do
+    found <- exploring (replaying (Switching [(2, 9)])) $ \run -> do
+      made <- run (both (sleep 1) (sleep 1))
+      when (points made < 0) (fail "unreachable")
+    either (show . because) show found `shouldSatisfy` ("the schedule does not fit" `isInfixOf`)

@@ -1,0 +1,238 @@
+module Sim.RecordSpec (spec) where
+
+import Control.Exception (ErrorCall (..), evaluate)
+import Data.Foldable (for_)
+import Data.List (isInfixOf)
+import Test.Hspec
+
+import Behavior (Seconds)
+import Behavior.Sim.Mock
+import Support (guarded)
+
+spec :: Spec
+spec = guarded $ do
+  describe "A record" reads'
+  describe "A claim" $ do
+    describe "of existence" existence
+    describe "of absence" absence
+    describe "of number" number
+    describe "of universality" universality
+    describe "of precedence" precedence
+    describe "of response" response
+    describe "of many things" conjunction
+    describe "that does not hold" refutation
+  describe "Moments" moments
+  describe "What goes on for a while" whiles
+
+-- | A line about something that has no arguments and is called once.
+line :: Seconds -> String -> Happening -> Entry
+line t who = Entry t who "" 1
+
+-- | A robot drives, its battery runs low, it stops slowly and charges; the battery is
+-- full again, and a second drive fails.
+day :: Record
+day =
+  Record
+    ["low", "drive", "charge", "sing"]
+    [ line 0 "low" (Is "False")
+    , line 1 "drive" Begins
+    , line 4 "low" (Becomes "True")
+    , line 4 "drive" AskedToStop
+    , line 5 "drive" Stops
+    , line 5 "charge" Begins
+    , line 9 "low" (Becomes "False")
+    , line 9 "charge" Succeeds
+    , Entry 9 "drive" "" 2 Begins
+    , Entry 12 "drive" "" 2 (Fails "stuck")
+    , line 12 "help!" Remarked
+    ]
+
+-- | Each of these holds, or does not.
+hold, doNotHold :: [Claim] -> Expectation
+hold claims = for_ claims $ \claim -> verdict claim day `shouldBe` Right ()
+doNotHold claims = for_ claims $ \claim -> day `shouldNotSatisfy` holds claim
+
+reads' :: Spec
+reads' = do
+  it "reads as a timeline, one line an entry" $
+    lines (show day)
+      `shouldBe` [ " 0.0 s  low: is False"
+                 , " 1.0 s  drive: begins"
+                 , " 4.0 s  low: becomes True"
+                 , " 4.0 s  drive: is asked to stop"
+                 , " 5.0 s  drive: has stopped"
+                 , " 5.0 s  charge: begins"
+                 , " 9.0 s  low: becomes False"
+                 , " 9.0 s  charge: done"
+                 , " 9.0 s  drive: begins (call 2)"
+                 , "12.0 s  drive: fails, stuck (call 2)"
+                 , "12.0 s  help!"
+                 ]
+
+  it "shows times without the noise of their sums" $
+    show (Record ["a"] [line (0.1 + 0.2) "a" Begins]) `shouldBe` "0.3 s  a: begins\n"
+
+existence :: Spec
+existence = do
+  it "holds of what is on record" $
+    hold [eventually (startOf "charge"), eventually (remarked "help!"), eventually (failureOf "drive")]
+
+  it "does not hold of what is not" $
+    doNotHold [eventually (startOf "sing"), eventually (faultOf "drive"), eventually (remarked "help")]
+
+  it "with a limit holds up to the limit, itself included" $ do
+    hold [withinSeconds 5 (startOf "charge"), withinSeconds 12 (failureOf "drive")]
+    doNotHold [withinSeconds 4.9 (startOf "charge"), withinSeconds 100 (startOf "sing")]
+
+  it "is not broken by the noise of sums" $
+    Record ["a"] [line (0.1 + 0.2) "a" Begins] `shouldSatisfy` holds (withinSeconds 0.3 (startOf "a"))
+
+  it "refuses a limit that is none" $
+    for_ [(-1, "-1.0"), (0 / 0, "NaN")] $ \(limit, shown) ->
+      evaluate (holds (whenever (startOf "sing") (withinSeconds limit (startOf "sing"))) day)
+        `shouldThrow` (== ErrorCall ("withinSeconds: a limit is zero or more seconds, not " ++ shown))
+
+absence :: Spec
+absence = do
+  it "holds of what is not on record" $
+    hold [never (startOf "sing"), never (faultOf "drive")]
+  it "does not hold of what is" $
+    doNotHold [never (startOf "charge"), never (anyOf [startOf "sing", startOf "charge"])]
+
+number :: Spec
+number =
+  it "counts" $ do
+    hold [exactly 2 (startOf "drive"), exactly 0 (startOf "sing"), exactly 1 (successOf "charge")]
+    doNotHold [exactly 1 (startOf "drive"), exactly 3 (startOf "drive")]
+    count (endOf "drive") day `shouldBe` 2
+
+universality :: Spec
+universality = do
+  it "holds when it goes on at everything that comes after" $
+    hold [whenever (failureOf "drive") (always (being "low" False))]
+  it "does not hold when it pauses" $
+    doNotHold [always (being "low" False), always (running "drive"), whenever (startOf "charge") (always (being "low" True))]
+  it "is not asked of a world that is being set up" $
+    Record ["a", "b"] [line 0 "a" (Is "1"), line 0 "b" (Is "2"), line 1 "a" (Becomes "3")]
+      `shouldSatisfy` holds (always (being "b" (2 :: Int)))
+
+precedence :: Spec
+precedence = do
+  it "holds when the first comes first, or the second never" $
+    hold
+      [ startOf "drive" `comesBefore` startOf "charge"
+      , interruptionOf "drive" `comesBefore` endOf "drive"
+      , startOf "sing" `comesBefore` faultOf "drive"
+      ]
+  it "does not hold when the second comes first, or without the first" $
+    doNotHold
+      [ startOf "charge" `comesBefore` startOf "drive"
+      , startOf "sing" `comesBefore` startOf "drive"
+      , startOf "drive" `comesBefore` startOf "drive"
+      ]
+
+response :: Spec
+response = do
+  it "is asked of all that comes after, each time" $ do
+    hold
+      [ whenever (becoming "low" True) (eventually (startOf "charge"))
+      , whenever (becoming "low" True) (withinSeconds 1 (startOf "charge"))
+      , whenever (startOf "drive") (eventually (endOf "drive"))
+      , whenever (startOf "sing") (eventually (endOf "sing"))
+      ]
+    doNotHold
+      [ whenever (becoming "low" False) (eventually (startOf "charge"))
+      , whenever (becoming "low" True) (withinSeconds 0.5 (startOf "charge"))
+      , whenever (startOf "drive") (eventually (startOf "drive"))
+      ]
+
+  it "nests" $ do
+    hold [whenever (becoming "low" True) (whenever (startOf "drive") (eventually (failureOf "drive")))]
+    doNotHold [whenever (becoming "low" True) (whenever (startOf "drive") (eventually (startOf "charge")))]
+
+conjunction :: Spec
+conjunction =
+  it "holds when all do" $ do
+    hold [mempty, eventually (startOf "drive") <> never (startOf "sing")]
+    doNotHold [eventually (startOf "drive") <> never (startOf "charge"), never (startOf "charge") <> never (startOf "sing")]
+
+refutation :: Spec
+refutation = do
+  it "says what does not hold, and shows the lines that prove it" $
+    verdict (whenever (becoming "low" True) (withinSeconds 0.5 (startOf "charge"))) day
+      `shouldBe` Left
+        ( unlines
+            [ "This does not hold: whenever \"low\" becomes True, within 0.5 s \"charge\" begins."
+            , "From 4.0 s on, it came only at 5.0 s:"
+            , "     0.0 s  low: is False"
+            , "     1.0 s  drive: begins"
+            , "  >  4.0 s  low: becomes True"
+            , "     4.0 s  drive: is asked to stop"
+            , "     5.0 s  drive: has stopped"
+            , "  >  5.0 s  charge: begins"
+            , "     9.0 s  low: becomes False"
+            , "     9.0 s  charge: done"
+            , "    ..."
+            ]
+        )
+
+  it "shows how the record ends when something never came" $
+    verdict (eventually (startOf "sing")) day
+      `shouldBe` Left
+        ( unlines
+            [ "This does not hold: eventually \"sing\" begins."
+            , "It never came:"
+            , "    ..."
+            , "     9.0 s  low: becomes False"
+            , "     9.0 s  charge: done"
+            , "     9.0 s  drive: begins (call 2)"
+            , "    12.0 s  drive: fails, stuck (call 2)"
+            , "    12.0 s  help!"
+            ]
+        )
+
+  it "is every one about a name that nobody bears" $
+    for_ [never (startOf "chrage"), startOf "chrage" `comesBefore` startOf "sing", never (startOf "sing" `during` being "lwo" True)] $
+      \claim -> verdict claim day `shouldSatisfy` either ("Nothing in this world is called" `isInfixOf`) (const False)
+
+moments :: Spec
+moments = do
+  it "are those of the one argument, or of any" $ do
+    let doors = Record ["open"] [Entry 0 "open" "\"front\"" 1 Begins, Entry 1 "open" "\"front\"" 1 (Fails "locked"), Entry 1 "open" "\"back\"" 1 Begins]
+    count (startOf "open") doors `shouldBe` 2
+    count (startOf "open \"front\"") doors `shouldBe` 1
+    doors `shouldSatisfy` holds (never (startOf "open \"cellar\""))
+
+  it "are not those of another whose name begins alike" $
+    count (startOf "open") (Record ["open", "open door"] [line 0 "open door" Begins]) `shouldBe` 0
+
+  it "joined are whichever of these, each once" $
+    count (anyOf [startOf "drive", startOf "charge", startOf "drive"]) day `shouldBe` 3
+
+  it "can be those while something goes on, or while it does not" $ do
+    count (startOf "drive" `outside` being "low" True) day `shouldBe` 2
+    count (startOf "charge" `during` being "low" True) day `shouldBe` 1
+    count (startOf "charge" `during` running "drive") day `shouldBe` 0
+    count (endOf "drive" `during` running "drive") day `shouldBe` 0
+    count (becoming "low" True `during` running "drive") day `shouldBe` 1
+
+whiles :: Spec
+whiles = do
+  it "overlap when one begins before the other has ended" $ do
+    let one = [line 0 "a" Begins, line 1 "b" Begins, line 2 "a" Succeeds, line 3 "b" Succeeds]
+        nested = [line 0 "b" Begins, line 1 "a" Begins, line 2 "a" Succeeds, line 3 "b" Succeeds]
+        apart = [line 0 "a" Begins, line 1 "a" Succeeds, line 1 "b" Begins, line 3 "b" Succeeds]
+        open = [line 0 "a" Begins, line 5 "b" Begins]
+        overlaps rows = count (running "a" `overlapping` running "b") (Record ["a", "b"] rows)
+    map overlaps [one, nested, apart, open] `shouldBe` [1, 1, 0, 1]
+
+  it "overlap with themselves when two calls run at once" $ do
+    let rows = [Entry 0 "a" "" 1 Begins, Entry 1 "a" "" 2 Begins, Entry 2 "a" "" 1 Succeeds, Entry 3 "a" "" 3 Begins, Entry 4 "a" "" 2 Stops]
+    count (running "a" `overlapping` running "a") (Record ["a"] rows) `shouldBe` 2
+
+  it "go on through the cleanup" $
+    count (interruptionOf "drive" `during` running "drive") day `shouldBe` 1
+
+  it "end when the value is lost" $ do
+    let rows = [line 0 "x" (Becomes "1"), line 1 "x" LosesItsValue, line 2 "a" Begins]
+    count (startOf "a" `during` being "x" (1 :: Int)) (Record ["x", "a"] rows) `shouldBe` 0
