@@ -1,4 +1,4 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench soak ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -12,6 +12,8 @@ help:
 	@echo 'make check     what cabal has to say about the package'
 	@echo 'make matrix    demo and test in clean Debian systems (SUITES="bookworm" selects)'
 	@echo 'make ci        all of these'
+	@echo 'make bench     what it costs: figures and ratios, with their targets'
+	@echo 'make soak      ever more random schedules and programs (SECONDS=600 for ten minutes)'
 	@echo 'make clean     remove what was built'
 
 demo:
@@ -26,6 +28,12 @@ programs warnings doctest readme lint docs check:
 
 matrix:
 	@.ci/matrix $(SUITES)
+
+bench:
+	@.ci/bench
+
+soak:
+	@.ci/soak $(or $(SECONDS),300)
 
 ci:
 	@.ci/run

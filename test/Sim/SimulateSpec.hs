@@ -65,19 +65,18 @@ times = do
   it "and none for what takes none" $
     finished <$> simulate (both (pure ()) (atomically (pure ()))) `shouldReturn` 0
   it "and sleepers of the same moment tie" $ do
-    book <- newNotebookOf
+    book <- newIORef ([] :: [String])
     forM_ [1 .. 40] $ \seed -> do
       order <- newTVarIO []
       let arm name = sleep 1 >> atomically (modifyTVar' order (name :))
       _ <- simulateWith defaults {scheduled = Seeded seed} (both (arm 'l') (arm 'r'))
       readTVarIO order >>= \o -> modifyIORef book (o :)
-    nub <$> readIORef book >>= (`shouldMatchList` ["lr", "rl"])
+    orders <- readIORef book
+    nub orders `shouldMatchList` ["lr", "rl"]
   it "up to the end that is set" $ do
     run <- simulateWith defaults {endAt = 10} (forever (sleep 3) :: Behavior ())
     explain (outcome run) `shouldContain` "the end that was set"
     finished run `shouldBe` 10
- where
-  newNotebookOf = newIORef ([] :: [String])
 
 -- | A small mission with everything in it.
 mission :: Behavior Int

@@ -17,7 +17,8 @@ module Behavior.Internal.Sim.Explore
 import Control.Exception hiding (Deadlock)
 import Control.Monad (when)
 import Data.IORef
-import Data.List (intercalate)
+import Data.List (dropWhileEnd, intercalate)
+import Data.Maybe (fromMaybe)
 
 import Behavior.Internal.Failure (Behavior, isCancellation)
 import Behavior.Internal.Sim.Policy
@@ -107,11 +108,12 @@ data Counterexample = Counterexample
 
 instance Show Counterexample where
   show c =
-    intercalate "\n" $
+    intercalate
+      "\n"
       [ "schedule " ++ show (foundAfter c) ++ " fails:"
       , indented (displayException (because c))
       , "shrunk to " ++ counted (failing c) ++ ", this happens:"
-      , narrate (story c)
+      , dropWhileEnd (== '\n') (narrate (story c))
       , "to see it again: explore (replaying (" ++ show (failing c) ++ "))"
       ]
    where
@@ -149,6 +151,7 @@ data Trial = Trial
 --   run <- simulate (parallel (sleep 1) (sleep 2))
 --   if finished run == 1 then pure () else fail "the first to finish does not end it"
 -- :}
+--
 -- >>> complete report
 -- True
 --
@@ -273,7 +276,7 @@ attempting o choosing property = do
               _ -> pure run
       improper run = throwIO (ErrorCall (explain (outcome run)))
   end <- try (property simulating)
-  (s, h, n) <- maybe ([], [], 0) id <$> readIORef made
+  (s, h, n) <- fromMaybe ([], [], 0) <$> readIORef made
   case end of
     Right () -> pure (Trial Nothing s h n)
     Left e

@@ -27,6 +27,7 @@ module Behavior.Sim.QuickCheck
   ) where
 
 import Control.Exception (Exception (..), throwIO)
+import Control.Monad ((>=>))
 import Test.QuickCheck
 
 import Behavior (Behavior, Seconds)
@@ -49,7 +50,7 @@ underSchedulesOf :: Testable prop => Int -> ((Behavior a -> IO (Run a)) -> IO pr
 underSchedulesOf n body =
   -- The seed is not shrunk: the schedule is, and better.
   forAllBlind chooseAny $ \seed -> ioProperty $ do
-    found <- exploring (Plan (Random n seed) defaults) (\simulating -> body simulating >>= holds)
+    found <- exploring (Plan (Random n seed) defaults) (body >=> holds)
     pure $ case found of
       Left c -> counterexample (show c) False
       Right _ -> property True

@@ -1,0 +1,34 @@
+-- |
+-- What the operators cost, a line for each: its name and nanoseconds. It is built twice,
+-- with the seam's switch and without.
+module Main (main) where
+
+import Control.Concurrent (runInUnboundThread)
+import Control.Concurrent.STM (newTVarIO, readTVar)
+import Control.Monad (forM_, replicateM_, void)
+
+import Behavior
+import Behavior.Parallel (allOf)
+import qualified Behavior.Signal as Signal
+import Behavior.Time (atomically, now)
+
+main :: IO ()
+main = runInUnboundThread $ do
+  level <- newTVarIO (50 :: Int)
+  let low = (< 10) <$> Signal.watching (readTVar level)
+      measured =
+        [ ("? that succeeds", 1000000, pure () ? pure ())
+        , ("? that fails", 200000, failed ? pure ())
+        , ("atomically", 1000000, void (atomically (readTVar level)))
+        , ("parallel", 40000, parallel (pure ()) (pure ()))
+        , ("both", 40000, both (pure ()) (pure ()))
+        , ("allOf 10", 10000, void (allOf (replicate 10 (pure ()))))
+        , ("monitor, watched", 40000, Signal.monitor low (pure ()) (pure ()))
+        , ("monitor, polled", 10000, monitor (pure False) (pure ()) (pure ()))
+        ] :: [(String, Int, Behavior ())]
+  forM_ measured $ \(name, times, act) -> do
+    replicateM_ (times `div` 10) act
+    begun <- now
+    replicateM_ times act
+    ended <- now
+    putStrLn (name ++ "\t" ++ show (realToFrac (ended - begun) * 1e9 / fromIntegral times :: Double))
