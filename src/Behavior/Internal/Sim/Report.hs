@@ -50,7 +50,9 @@ instead = \case
     "in a transaction (Control.Concurrent.STM.atomically, or async's wait, race, concurrently): \
     \use Behavior.Time.atomically, parallel, both, fork"
   InThrowing -> "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork"
-  Elsewhere -> "for something that this library knows nothing of (threadDelay?): use sleep, or atomically"
+  Elsewhere ->
+    "for something that this library knows nothing of (threadDelay): \
+    \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
 
 -- | What happened, a line for each step (what repeats itself is told once).
 --

@@ -18,9 +18,8 @@ import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import System.IO.Unsafe (unsafePerformIO)
 
 #if !defined(mingw32_HOST_OS)
-import System.Exit (ExitCode (..))
 import System.IO (hFlush, hPutStrLn, stderr)
-import System.Posix.Process (exitImmediately)
+import System.Posix.Signals (raiseSignal, sigKILL)
 #endif
 
 import Behavior.Internal.Seam (Seconds (..))
@@ -108,7 +107,7 @@ blocked (ThreadBlocked reason) = case reason of
   _ -> Nothing
 blocked _ = Nothing
 
--- | Ends the process, with a message.
+-- | Kills the process, with a message.
 giveUp :: Task -> IO ()
 #if defined(mingw32_HOST_OS)
 giveUp _ = pure ()
@@ -116,5 +115,6 @@ giveUp _ = pure ()
 giveUp runner = do
   hPutStrLn stderr ("simulate: " ++ show (taskLabel runner) ++ " cannot be stopped")
   hFlush stderr
-  void (exitImmediately (ExitFailure 124))
+  -- A regular exit would wait for it.
+  raiseSignal sigKILL
 #endif
