@@ -22,12 +22,16 @@ import qualified Behavior.StormSpec
 import qualified Behavior.TimeSpec
 import qualified Examples.DoorBatterySpec
 import qualified Examples.ProgressProblemSpec
+import qualified Examples.TestingARobotSpec
 import qualified Paper.DoorsSpec
 import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
+import qualified Promises.PromisesSimSpec
+import qualified SemanticsSpec
 import qualified Sim.ExploreSpec
 import qualified Sim.MockSpec
+import qualified Sim.QuickCheckSpec
 import qualified Sim.RecordSpec
 import qualified Sim.SimulateSpec
 
@@ -58,6 +62,9 @@ main = hspec $ do
     Sim.ExploreSpec.spec
     Sim.RecordSpec.spec
     Sim.MockSpec.spec
+    Sim.QuickCheckSpec.spec
+  describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
+  describe "Specification" SemanticsSpec.spec
   describe "The paper" $ do
     Paper.ListingsSpec.spec
     Paper.DoorsSpec.spec
@@ -66,3 +73,4 @@ main = hspec $ do
   describe "Examples" $ do
     describe "door-battery" Examples.DoorBatterySpec.spec
     describe "progress-problem" Examples.ProgressProblemSpec.spec
+    describe "testing-a-robot" Examples.TestingARobotSpec.spec

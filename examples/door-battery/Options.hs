@@ -5,6 +5,7 @@
 module Options
   ( Options (..)
   , Program (..)
+  , Mode (..)
   , parse
   ) where
 
@@ -27,12 +28,22 @@ data Options = Options
   , program :: Program
   , speedFactor :: Double
   , seed :: Maybe Integer
+  , mode :: Mode
   }
   deriving (Eq, Show)
 
 -- | The versions of the program that are in the paper.
 data Program = First | WithDo | OverDoors | WithAttempts | Introduction
   deriving (Eq, Show, Enum, Bounded)
+
+-- | How the mission is run, and how often.
+data Mode
+  = Really
+  | -- | By the random schedule of this number; else by the undisturbed one.
+    Simulated (Maybe Integer)
+  | -- | So many missions.
+    Explored Int
+  deriving (Eq, Show)
 
 -- | Reads the arguments. The result of anything wrong with them has the exit code 2,
 -- and a message that says what would be right.
@@ -57,8 +68,9 @@ commandLine =
         \run out of battery: the example of Biggar and Shames, in a mock world."
       <> footer
         "Exit status: 0 when the task is done, 1 when the robot failed, 2 for bad options, \
-        \3 for a fault of the world (the battery is flat), 130 or 143 when stopped by \
-        \SIGINT (Ctrl-C) or SIGTERM."
+        \3 for a fault of the world (the battery is flat), 4 when a simulated mission was \
+        \not over after what would be an hour, 130 or 143 when stopped by SIGINT (Ctrl-C) or SIGTERM. \
+        \Of --explore: that of the worst mission."
 
 options :: Parser Options
 options =
@@ -75,14 +87,32 @@ options =
       ("version of the paper: " ++ allowed aProgram ++ "; 1 is kept as printed: if the front \
        \door is open it opens it, if not it goes on without")
     <*> given "speed" "FACTOR" factor 1
-      "how much faster than real time (the battery is read every 10 ms of real time)"
+      "how much faster than real time (the battery is read every 10 ms of real time; so it \
+       \is in a simulation too, which is over at once whatever the factor)"
     <*> optional
       (option (reader wholeNumber) . mconcat $
         [ long "seed"
         , metavar "N"
         , help "vary the length of every action but recharge by up to 20 %, each N in its own way"
         ])
+    <*> (simulation <|> exploration <|> pure Really)
  where
+  simulation =
+    flag' Simulated (long "simulate" <> help "the same in virtual time: what happens is told at once")
+      <*> optional
+        (option (reader wholeNumber) . mconcat $
+          [ long "schedule"
+          , metavar "N"
+          , help "which thread goes first when several can: at random, each N in its own way"
+          ])
+  exploration =
+    option (Explored <$> reader howMany) . mconcat $
+      [ long "explore"
+      , metavar "N"
+      , help
+          "simulate N missions, with the seeds and schedules 1, 2 and so on (or from --seed on), \
+          \and tell only the worst"
+      ]
   given name meta kind byDefault what =
     option (reader kind) . mconcat $
       [ long name
@@ -162,6 +192,15 @@ wholeNumber =
     { noun = "a whole number"
     , allowed = "0, 1, 2 and so on"
     , recognised = digits
+    , written = show
+    }
+
+howMany :: Kind Int
+howMany =
+  Kind
+    { noun = "a number of missions"
+    , allowed = "a whole number from 1 to 1000000"
+    , recognised = fmap fromInteger . mfilter (\n -> n >= 1 && n <= 1000000) . digits
     , written = show
     }
 

@@ -9,14 +9,17 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (replicateM_, unless, void)
 import Data.Foldable (for_)
+import Data.IORef
 import Data.List (group)
 import Test.Hspec hiding (after, around, before)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (ioProperty, (===))
 
 import Behavior (failWith)
-import Behavior.Internal.Runtime (atomically)
+import Behavior.Internal.Runtime (atomically, now, sleep)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (finished, simulate)
+import Behavior.Time (timeout)
 import Support
 import Watched
 
@@ -163,6 +166,15 @@ selecting = do
         set dial (Says False)
         awaitEnd caller `shouldReturn` expected news
       notes book `shouldReturn` ["left"]
+
+  it "hears its own cancellation while a branch is slow to hear the stop, and stops its sensor then" $ do
+    -- The branch is asked at 1, and hears nothing until 5. The caller is cancelled at 3.
+    readings' <- newIORef []
+    let test = now >>= \t -> (t < 1) <$ modifyIORef readings' (t :)
+        slow = uninterruptibleMask_ (sleep 5)
+    run <- simulate (timeout 3 (Signal.rSelect (Signal.polling 0.4 test) slow (pure ())))
+    finished run `shouldBe` 5
+    readIORef readings' >>= (`shouldSatisfy` (<= 3)) . maximum
  where
   expected news = case news of
     SaysFailure -> FailedWith "FailedBecause \"the sensor\""

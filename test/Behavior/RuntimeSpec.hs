@@ -18,7 +18,7 @@ import GHC.Conc.Sync (threadLabel)
 import Test.Hspec
 
 import Behavior (Failed (..), failed)
-import Behavior.Internal.Runtime
+import Behavior.Internal.Runtime hiding (note)
 import Behavior.Internal.Scope
 import Support
 
@@ -80,19 +80,28 @@ starting = do
 
 interrupting :: Spec
 interrupting = do
-  it "returns when the thread has heard it, and cannot be interrupted while it waits for that" $ do
+  it "returns when the thread has heard it" $ do
     inside <- newGate
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread ())
     pass inside
     launching (interrupt (threadId thread) (Cancel "thread")) $ \caller -> do
-      throwing (asyncThreadId caller) (Cancel "caller")
-      -- It is blocked, though not in a transaction or at an MVar.
       poll caller >>= (`shouldBe` True) . isNothing
       open mayEnd
+      awaitEnd caller `shouldReturn` Gave ()
       end <- atomically (threadEnd thread)
       endingOf end `shouldBe` CancelledBy (show (Cancel "thread"))
-      void (awaitEnd caller)
+
+  it "has thrown nothing if it is interrupted before the thread has heard it" $ do
+    inside <- newGate
+    mayEnd <- newGate
+    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> pure 'a'))
+    pass inside
+    cancelling (interrupt (threadId thread) (Cancel "thread")) (pure ())
+      `shouldReturn` CancelledBy (show (Cancel "the caller"))
+    open mayEnd
+    end <- atomically (threadEnd thread)
+    endingOf end `shouldBe` Gave 'a'
 
   it "by a messenger does not wait" $ do
     inside <- newGate

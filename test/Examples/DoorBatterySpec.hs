@@ -1,18 +1,121 @@
 -- |
--- The command line of @door-battery@. (How its runs end is checked on the program
--- itself.)
+-- The command line of @door-battery@, and its simulated missions. (How its real runs end
+-- is checked on the program itself.)
 module Examples.DoorBatterySpec (spec) where
 
 import Data.Foldable (for_)
+import Data.List (isSuffixOf, nub, stripPrefix)
+import Data.Maybe (mapMaybe)
 import Options.Applicative (ParserResult (..), renderFailure)
 import System.Exit (ExitCode (..))
 import Test.Hspec
 
+import Behavior.Sim (Schedule (..))
+import Exploration
+import Mission
 import Options
+import Support (guarded)
 import World (DoorState (..))
 
 spec :: Spec
 spec = do
+  describe "Its command line" commandLine
+  describe "A simulated mission" (guarded simulation)
+  describe "Many of them" (guarded exploration)
+
+-- | Each mission takes milliseconds, in which minutes pass.
+simulation :: Spec
+simulation = do
+  it "tells the story with the times of the world" $ do
+    (story, m) <- simulated (given []) Undisturbed
+    end <$> m `shouldBe` Just TaskDone
+    take 5 story
+      `shouldBe` [ "    0.0 s   13 %  open front door ..."
+                 , "    0.5 s   11 %  open front door: failed, the front door is locked"
+                 , "    0.5 s   11 %  open back door ..."
+                 , "    0.8 s    9 %  open back door: interrupted, motors off"
+                 , "    0.8 s    9 %  recharge ..."
+                 ]
+    last story `shouldSatisfy` isSuffixOf "the task is done"
+
+  for_ endings $ \(arguments, expected, exit, line) ->
+    it ("ends as the real one: " ++ unwords arguments) $ do
+      (story, m) <- simulated (given arguments) Undisturbed
+      let how = maybe NotOver end m
+      (how, status how) `shouldBe` (expected, exit)
+      last story `shouldSatisfy` isSuffixOf line
+
+  it "knows how far the battery came down" $ do
+    -- Read every 10 ms, at 4 % a second, it is low just below 10 %.
+    (_, m) <- simulated (given []) Undisturbed
+    lowest <$> m `shouldSatisfy` maybe False (\level -> level > 9.8 && level < 10)
+    (_, n) <- simulated (given ["--drain", "0"]) Undisturbed
+    lowest <$> n `shouldBe` Just 13
+
+  it "that would go on for ever is given up" $ do
+    -- Full for hardly a second, with a task that takes several.
+    (story, m) <- simulated (given ["--threshold", "95", "--speed", "0.1"]) Undisturbed
+    m `shouldBe` Nothing
+    status NotOver `shouldBe` ExitFailure 4
+    last story `shouldContain` "given up"
+
+  it "is the same again by the same seed and schedule, and another by another" $ do
+    let run k n = simulated (given ["--seed", show (k :: Int)]) (Seeded n)
+    first <- run 1 2
+    run 1 2 `shouldReturn` first
+    run 2 2 >>= (`shouldNotBe` first)
+
+exploration :: Spec
+exploration = do
+  it "are as many as were asked for, all different" $ do
+    missions <- explored 20 (given [])
+    map fst missions `shouldBe` [1 .. 20]
+    worst missions `shouldBe` TaskDone
+    length (nub (map (fmap lasted . snd) missions)) `shouldSatisfy` (> 10)
+
+  it "start from the seed that is given" $
+    map fst <$> explored 3 (given ["--seed", "41"]) `shouldReturn` [41, 42, 43]
+
+  it "are reported with how to see the worst again, and that shows it" $ do
+    missions <- explored 50 (given tight)
+    let report = reported missions
+        level = minimum (mapMaybe (fmap lowest . snd) missions)
+        longest = maximum (mapMaybe (fmap lasted . snd) missions)
+    again "lowest battery: " report >>= (`shouldBe` Just level) . fmap lowest
+    again "longest mission: " report >>= (`shouldBe` Just longest) . fmap lasted
+
+  it "end as the worst of them" $ do
+    missions <- explored 3 (given ["--front", "sealed", "--back", "sealed"])
+    status (worst missions) `shouldBe` ExitFailure 1
+    reported missions `shouldContain` ["      3  the robot failed: --simulate --seed 1 --schedule 1"]
+
+  it "are reported when some come to no end" $ do
+    report <- reported <$> explored 1 (given ["--threshold", "95", "--action", "60"])
+    report !! 5 `shouldContain` "      1  not over"
+ where
+  -- Sometimes low on the way, sometimes not.
+  tight = ["--battery", "31", "--action", "0.9"]
+  -- The mission that the line of the report says how to see.
+  again title report = case mapMaybe (stripPrefix title) report of
+    [text] -> case parse (tight ++ words (drop 2 (dropWhile (/= ':') text))) of
+      Success o | Simulated (Just n) <- mode o -> snd <$> simulated o (Seeded (fromInteger n))
+      _ -> fail ("no options: " ++ text)
+    _ -> fail ("not one line " ++ title)
+
+endings :: [([String], End, ExitCode, String)]
+endings =
+  [ (["--front", "open", "--seed", "7"], TaskDone, ExitSuccess, "the task is done")
+  , (["--program", "1", "--front", "open"], TaskDoneOutside, ExitSuccess, "the task is done, but not in the room")
+  , (["--program", "4", "--front", "jammed:2"], TaskDone, ExitSuccess, "the task is done")
+  , (sealed, RobotFailed, ExitFailure 1, "the robot failed at \"smash back door\": the back door is sealed")
+  , (["--battery", "5", "--drain", "50", "--threshold", "0"], RanFlat, ExitFailure 3, "the battery is flat")
+  , (["--speed", "20", "--battery", "60", "--action", "20", "--drain", "0.5"], TaskDone, ExitSuccess, "the task is done")
+  ]
+ where
+  sealed = ["--front", "sealed", "--back", "sealed"]
+
+commandLine :: Spec
+commandLine = do
   it "takes every state of a door" $
     for_ states $ \(word, state) ->
       accepted ["--front", word, "--back", word] (\o -> (front o, back o)) `shouldBe` Just (state, state)
@@ -24,8 +127,8 @@ spec = do
   describe "refuses, with exit status 2 and what is allowed," $
     for_ refusals $ \(option, word, allowed) ->
       it (option ++ " " ++ word) $ do
-        let (message, status) = refused [option, word]
-        status `shouldBe` ExitFailure 2
+        let (message, exit) = refused (words option ++ [word])
+        exit `shouldBe` ExitFailure 2
         message `shouldContain` allowed
 
   it "refuses a threshold for the programs that are printed with one" $
@@ -33,7 +136,20 @@ spec = do
 
   it "has the exit status 0 when it was asked for help" $
     snd (refused ["--help"]) `shouldBe` ExitSuccess
+
+  it "says how missions are run" $
+    for_ modes $ \(arguments, chosen) -> accepted arguments mode `shouldBe` Just chosen
+
+  it "refuses two ways at once, and a schedule where there is none" $
+    for_ [["--simulate", "--explore", "2"], ["--schedule", "1"], ["--explore", "2", "--schedule", "1"]] $
+      (`shouldBe` ExitFailure 2) . snd . refused
  where
+  modes =
+    [ ([], Really)
+    , (["--simulate"], Simulated Nothing)
+    , (["--simulate", "--schedule", "7"], Simulated (Just 7))
+    , (["--explore", "100"], Explored 100)
+    ]
   states =
     [ ("open", Open)
     , ("closed", Closed)
@@ -55,7 +171,15 @@ spec = do
     , ("--speed", "0", "greater than 0")
     , ("--speed", "Infinity", "greater than 0")
     , ("--seed", "-1", "0, 1, 2 and so on")
+    , ("--simulate --schedule", "x", "0, 1, 2 and so on")
+    , ("--explore", "0", "from 1 to 1000000")
+    , ("--explore", "1e3", "from 1 to 1000000")
     ]
+
+given :: [String] -> Options
+given arguments = case parse arguments of
+  Success o -> o
+  _ -> error "no such options"
 
 accepted :: [String] -> (Options -> a) -> Maybe a
 accepted arguments field = case parse arguments of

@@ -9,7 +9,6 @@ module Semantics.Generate
   , smallWorlds
   , shrinkWorld
   , depth
-  , size
   ) where
 
 import Data.List (sortOn)
@@ -20,21 +19,26 @@ import Semantics.Program
 -- | Worlds with programs that nest up to so many operators deep.
 worlds :: Int -> Gen World
 worlds deep = do
-  levels' <- traverse (\c -> (,) c <$> frequency [(6, At <$> choose (0, 1)), (1, pure Lost)]) known
+  levels' <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure Lost)]) known
   World levels' <$> someChanges <*> choose (4, 16) <*> (renamed <$> programs deep)
  where
   someChanges = do
-    n <- choose (0, 6)
-    sortOn (\(Change at _ _) -> at) <$> vectorOf n (Change <$> choose (0, 8) <*> elements known <*> someLevel)
-  someLevel = frequency [(12, At <$> choose (0, 2)), (1, pure Lost), (1, pure Failing), (1, pure Faulting)]
+    n <- choose (0, 8)
+    inOrder <$> vectorOf n (Change <$> choose (0, 8) <*> elements known <*> someLevel)
+  someLevel = frequency [(30, At <$> choose (0, 2)), (1, pure Lost), (1, pure Failing), (1, pure Faulting)]
 
 -- | Worlds so small that all that can happen in them can be tried.
 smallWorlds :: Gen World
 smallWorlds = do
   first <- At <$> choose (0, 1)
   n <- choose (0, 2)
-  changes' <- sortOn (\(Change at _ _) -> at) <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> frequency [(4, At <$> choose (0, 1)), (1, pure Lost)])
+  changes' <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
   World [("p", first), ("q", At 0)] changes' <$> choose (2, 4) <*> (renamed <$> programs 1)
+ where
+  someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure Lost)]
+
+inOrder :: [Change] -> [Change]
+inOrder = sortOn (\(Change at _ _) -> at)
 
 known :: [Condition]
 known = ["p", "q"]
@@ -47,7 +51,13 @@ within' :: Bool -> Int -> Gen Program
 within' inScope = go
  where
   go :: Int -> Gen Program
-  go 0 = frequency ((12, action) : (1, Pure . Number <$> choose (0, 2)) : (1, WaitUntil <$> signal 0) : [(3, Fork <$> action) | inScope])
+  go 0 =
+    frequency $
+      [ (30, action)
+      , (1, Pure . Number <$> choose (0, 2))
+      , (1, WaitUntil <$> signal 0)
+      ]
+        ++ [(8, Fork <$> action) | inScope]
   go n =
     frequency $
       [ (1, go 0)
@@ -59,22 +69,26 @@ within' inScope = go
       , (2, Both <$> less <*> less)
       , (2, FirstOf <$> few less)
       , (2, AllOf <$> few less)
-      , (3, RSelect <$> sensed <*> less <*> less)
-      , (3, Monitor <$> sensed <*> takingTime less <*> less)
-      , (1, Switch <$> sensed <*> few1 less)
-      , (1, TeleoReactive <$> few ((,) <$> sensed <*> less))
+      , (4, RSelect <$> sensed <*> less <*> less)
+      , (5, Monitor <$> sensed <*> takingTime less <*> less)
+      , (2, Switch <$> sensed <*> few1 less)
+      , (2, TeleoReactive <$> few ((,) <$> sensed <*> less))
       , (1, WaitUntil <$> sensed)
       , (2, WhileHolding <$> sensed <*> less)
-      , (3, Timeout <$> choose (0, 4) <*> less)
+      , (2, Timeout <$> frequency [(1, pure 0), (9, choose (1, 6))] <*> less)
       , (2, Scoped <$> within' True (n - 1))
       ]
         ++ [(3, Fork <$> less) | inScope]
    where
     less = frequency [(1, choose (0, n - 1)), (2, pure (n - 1))] >>= go
     sensed = signal (n - 1)
-    few one = choose (0, 3) >>= \k -> vectorOf k one
+    few one = frequency [(1, pure 0), (4, pure 1), (10, choose (2, 3))] >>= \k -> vectorOf k one
     few1 one = choose (1, 3) >>= \k -> vectorOf k one
-  signal n = frequency [(4, Watched <$> elements known), (1, Polled <$> choose (1, 3) <*> (choose (0, min 1 n) >>= go))]
+  signal n =
+    frequency
+      [ (4, Watched <$> elements known)
+      , (1, Polled <$> choose (1, 3) <*> (choose (0, min 1 n) >>= go))
+      ]
   -- One that takes no time, while the condition holds, would go on for ever.
   takingTime later = Then <$> (Do "a" . pure . (\s -> s {takes = max 1 (takes s)}) <$> script) <*> later
 
@@ -85,12 +99,12 @@ script :: Gen Script
 script =
   Script
     <$> frequency [(1, pure 0), (6, choose (1, 4))]
-    <*> frequency [(10, Succeeds <$> choose (0, 2)), (4, pure Fails), (1, pure Faults)]
+    <*> frequency [(14, Succeeds <$> choose (0, 2)), (4, pure Fails), (1, pure Faults)]
     <*> frequency [(6, pure Unmasked), (1, pure Masked), (1, pure Uninterruptible)]
     <*> frequency
       [ (4, pure StopsAtOnce)
       , (3, StopsAfter <$> choose (0, 3))
-      , (1, EndsAfter <$> choose (0, 2) <*> (Succeeds <$> choose (0, 2)))
+      , (2, EndsAfter <$> choose (0, 2) <*> (Succeeds <$> choose (0, 2)))
       , (1, EndsAfter <$> choose (0, 2) <*> pure Fails)
       , (1, EndsAfter <$> choose (0, 2) <*> pure Faults)
       ]
@@ -163,10 +177,9 @@ rebuild p new = case (p, new) of
   ruled ((s, _) : rules) as | (s', a : as') <- sensing s as = (s', a) : ruled rules as'
   ruled _ _ = []
 
--- | How deep a program nests, and how large it is.
-depth, size :: Program -> Int
+-- | How deep a program nests.
+depth :: Program -> Int
 depth p = maximum (0 : map ((+ 1) . depth) (parts p))
-size p = 1 + sum (map size (parts p))
 
 -- | Smaller worlds of the same kind.
 shrinkWorld :: World -> [World]
@@ -187,7 +200,12 @@ shrinkWorld world =
 shrinkProgram :: Program -> [Program]
 shrinkProgram p = parts p ++ outer ++ inner
  where
-  inner = [rebuild p (take n ps ++ [q'] ++ drop (n + 1) ps) | let ps = parts p, (n, q) <- zip [0 ..] ps, q' <- shrinkPart q]
+  inner =
+    [ rebuild p (take n ps ++ [q'] ++ drop (n + 1) ps)
+    | let ps = parts p
+    , (n, q) <- zip [0 ..] ps
+    , q' <- shrinkPart q
+    ]
   -- What keeps a recovery from going on for ever stays.
   shrinkPart q = case (p, q) of
     (Monitor {}, Then first second) -> Then first <$> shrinkProgram second

@@ -11,6 +11,10 @@ module Semantics.Path
 
     -- * All paths
   , paths
+
+    -- * What can be seen
+  , everything
+  , whatIsDone
   ) where
 
 import Control.Monad (foldM)
@@ -20,6 +24,7 @@ import Data.Set (Set)
 import qualified Data.Set as Set
 
 import Semantics.Program
+import Semantics.State (Now (clock), Running (Over), State (..), initial)
 import Semantics.Step
 
 -- | What could be seen of a run, and how it ended.
@@ -48,12 +53,13 @@ data Verdict
     OutOfFuel
   deriving (Eq, Show)
 
--- | Whether a run of the world may have been seen so.
-explains :: Int -> World -> Seen -> Verdict
-explains fuel world seen = go (Set.singleton (initial world)) (timeline seen)
+-- | Whether a run of the world may have been seen so. It is said which events can be seen
+-- at all.
+explains :: Int -> (Event -> Bool) -> World -> Seen -> Verdict
+explains fuel visible world seen = go (Set.singleton (initial world)) (filter (visible . snd) (timeline seen))
  where
   go states = \case
-    [] -> case (end seen, silently fuel (upTo (end seen)) states) of
+    [] -> case (end seen, silently fuel visible (upTo (end seen)) states) of
       (Unknown, _) -> Possible
       (_, Nothing) -> OutOfFuel
       (_, Just these)
@@ -64,25 +70,25 @@ explains fuel world seen = go (Set.singleton (initial world)) (timeline seen)
     rest@((t, event) : later) -> case still t of
       Nothing -> OutOfFuel
       Just these -> case [s' | s <- at t these, (e, s') <- step s, e == event] of
-        [] -> Impossible rest [(clock (now s), e) | s <- Set.toList these, (e, _) <- step s, e /= Silent]
+        [] -> Impossible rest [(clock (now s), e) | s <- Set.toList these, (e, _) <- step s, visible e]
         next -> go (Set.fromList next) later
    where
-    still t = silently fuel (Just t) states
+    still t = silently fuel visible (Just t) states
   upTo = \case
     Gave t _ -> Just t
     _ -> Nothing
   at t = filter ((== t) . clock . now) . Set.toList
 
 -- | Every timeline that the relation allows, with its end. Nothing: more than fuel.
-paths :: Int -> World -> Maybe (Set Seen)
-paths fuel world = Set.fromList <$> go [] (Set.singleton (initial world))
+paths :: Int -> (Event -> Bool) -> World -> Maybe (Set Seen)
+paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world))
  where
   go past states = do
-    these <- silently fuel Nothing states
+    these <- silently fuel visible Nothing states
     let ends' = Set.fromList (mapMaybe endOf (Set.toList these))
         next =
           Map.fromListWith Set.union $
-            [((clock (now s), e), Set.singleton s') | s <- Set.toList these, (e, s') <- step s, e /= Silent]
+            [((clock (now s), e), Set.singleton s') | s <- Set.toList these, (e, s') <- step s, visible e]
         here = [Seen {timeline = reverse past, end = e} | e <- Set.toList ends']
     foldM
       (\found (seen, states') -> do
@@ -92,8 +98,8 @@ paths fuel world = Set.fromList <$> go [] (Set.singleton (initial world))
       (Map.toList next)
 
 -- | All states that are reached without anything to see, up to a moment.
-silently :: Int -> Maybe Ticks -> Set State -> Maybe (Set State)
-silently fuel limit states = go states (Set.toList states)
+silently :: Int -> (Event -> Bool) -> Maybe Ticks -> Set State -> Maybe (Set State)
+silently fuel visible limit states = go states (Set.toList states)
  where
   go known = \case
     [] -> Just known
@@ -104,7 +110,7 @@ silently fuel limit states = go states (Set.toList states)
            in go (foldr Set.insert known new) (new ++ others)
   quietly s = case step s of
     [] | Just later <- pass s, maybe True (clock (now later) <=) limit -> [later]
-    next -> [s' | (Silent, s') <- next]
+    next -> [s' | (e, s') <- next, not (visible e)]
 
 -- | How the run ended, if it has.
 endOf :: State -> Maybe End
@@ -112,3 +118,11 @@ endOf s = case running s of
   Over r -> Just (Gave (clock (now s)) r)
   _ | null (step s), Nothing <- pass s -> Just Deadlock
   _ -> Nothing
+
+-- | Whether an event can be seen.
+everything, whatIsDone :: Event -> Bool
+everything = (/= Silent)
+whatIsDone = \case
+  Silent -> False
+  IsOver _ -> False
+  _ -> True

@@ -9,6 +9,7 @@ module Semantics.Program
     Program (..)
   , Signal (..)
   , Name
+  , Label
   , Ticks
 
     -- * What actions do
@@ -118,6 +119,9 @@ data Response
 
 type Condition = Name
 
+-- | The name of a branch: the operator's, and its own.
+type Label = String
+
 -- | What a condition may be at.
 data Level
   = At Int
@@ -167,6 +171,8 @@ data Event
     Silent
   | Name `Does` Deed
   | Becomes Condition Level
+  | -- | The branch of this name is known to have ended.
+    IsOver Label
   deriving (Eq, Ord, Show)
 
 data Deed

@@ -1,5 +1,4 @@
 {-# LANGUAGE LambdaCase #-}
-{-# LANGUAGE RankNTypes #-}
 
 -- |
 -- A program of the specification, as a behaviour on the library's own operators.
@@ -29,27 +28,28 @@ import qualified Data.Set as Set
 import Behavior.Internal.Failure hiding (Failed (..))
 import Behavior.Internal.Parallel
 import Behavior.Internal.Reactive
-import Behavior.Internal.Runtime hiding (Event (..))
+import Behavior.Internal.Runtime hiding (Event (..), Label)
 import Behavior.Internal.Sensor
 import Behavior.Internal.Scope (StoppedWithFault (..))
 import Behavior.Internal.Source (watching)
 import Behavior.Internal.Time
 import Behavior.Sim
   ( Did (Says)
+  , Label (..)
   , Options (endAt, scheduled, standstill)
   , Plan (..)
   , Report (complete)
   , Run (finished, outcome)
   , Schedule
   , Search (Exhaustive)
-  , Step (Step, at, did)
+  , Step (at, did, label)
   , defaults
   , explore
   , simulateWith
   )
 import qualified Behavior.Sim as Sim
 import Semantics.Path (End (..), Seen (..))
-import Semantics.Program
+import Semantics.Program hiding (Label)
 
 -- | Simulates the world's program under a schedule, and gives what could be seen; or
 -- says why there was no end to see.
@@ -71,14 +71,14 @@ allObserved preemptions most world = do
 limits :: Options
 limits = defaults {standstill = 20000, endAt = 60}
 
-observing :: (forall a. Behavior a -> IO (Run a)) -> World -> IO (Either String Seen)
+observing :: (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Seen)
 observing simulated world = do
   happened <- newIORef []
   -- In the record of the run is when it happened.
   let tell event = modifyIORef' happened (event :) >> note (show event)
   run <- simulated (behavior tell world)
-  events <- reverse <$> readIORef happened
-  let record = zip [ticks (at s) | s@Step {did = Says _} <- Sim.steps run] events
+  told <- reverse <$> readIORef happened
+  let record = recorded (Sim.steps run) told
       seen e = Right Seen {timeline = record, end = e}
       gave = seen . Gave (ticks (finished run))
   pure $ case outcome run of
@@ -89,12 +89,19 @@ observing simulated world = do
     Sim.Deadlock _ -> seen Deadlock
     Sim.OutOfTime -> seen Unknown
     Sim.Livelock labels -> Left ("livelock: " ++ show labels)
-    Sim.Outside label _ -> Left ("outside: " ++ show label)
+    Sim.Outside who _ -> Left ("outside: " ++ show who)
     Sim.Meddled waiting -> Left ("meddled: " ++ show waiting)
-    Sim.TooSlow label -> Left ("too slow: " ++ show label)
+    Sim.TooSlow who -> Left ("too slow: " ++ show who)
     Sim.Misfit why -> Left ("misfit: " ++ why)
  where
   ticks = round
+  recorded (s : others) events = case (did s, events) of
+    (Says _, event : later) -> (ticks (at s), event) : recorded others later
+    -- The relation speaks of branches only.
+    (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others events
+    _ -> recorded others events
+  recorded [] _ = []
+  isBranch (Label _ name) = name `notElem` ["", "polling", "clock"]
 
 -- | Where a program acts: what the conditions are at, how often actions were called,
 -- and where to fork.

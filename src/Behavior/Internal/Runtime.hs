@@ -97,12 +97,12 @@ life label act begin unmask = do
   modifyLiving (-1)
   pure end
 
--- | Throws an exception to a thread, and returns, uninterruptibly, when that has
--- heard it or has ended. A thread in an uninterruptible cleanup is slow to hear.
+-- | Throws an exception to a thread, and returns when that has heard it or has ended. A
+-- thread in an uninterruptible cleanup is slow to hear; whoever waits for it can be
+-- interrupted, and then has thrown nothing.
 interrupt :: Exception e => ThreadId -> e -> IO ()
 interrupt thread e =
-  uninterruptibleMask_ $
-    inSimulation (throwTo thread e) (\simulation -> deliver simulation thread (toException e))
+  inSimulation (throwTo thread e) (\simulation -> deliver simulation thread (toException e))
 
 -- | 'interrupt' by a messenger of its own, which does the waiting.
 interruptByMessenger :: Exception e => ThreadId -> e -> IO ()
@@ -110,7 +110,7 @@ interruptByMessenger thread e =
   inSimulation byMessenger (\simulation -> send simulation thread (toException e))
  where
   byMessenger = do
-    messenger <- forkIO (interrupt thread e)
+    messenger <- forkIO (uninterruptibleMask_ (interrupt thread e))
     labelThread messenger (show (Label "interrupt" "messenger"))
 
 -- | How many threads started by 'start' have not ended.

@@ -44,12 +44,14 @@ import Control.Exception
   , asyncExceptionToException
   , mask
   , mask_
+  , onException
   , throwIO
   , try
+  , uninterruptibleMask_
   )
 import Control.Monad (filterM)
 import Data.Foldable (traverse_)
-import Data.IORef (IORef, atomicModifyIORef', modifyIORef', newIORef, readIORef)
+import Data.IORef (IORef, atomicModifyIORef', modifyIORef', newIORef, readIORef, writeIORef)
 
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime
@@ -104,7 +106,8 @@ structured body = mask $ \restore -> do
 end :: Scope -> IO [SomeException]
 end (Scope branches) = do
   started <- reverse <$> readIORef branches
-  ask started
+  -- Nothing may interrupt this, or the rest would be orphaned.
+  uninterruptibleMask_ (ask started)
   concat <$> traverse (\(SomeBranch b) -> faults <$> atomicallyFirmly (outcome b)) started
  where
   faults = \case
@@ -143,11 +146,14 @@ forget (Scope branches) old = modifyIORef' branches without
 
 -- | Asks branches to stop, all at once: none hears it later because another cannot
 -- be interrupted just now. Returns when the last of the list has heard it.
+--
+-- Whoever waits for that can be interrupted, if it lets itself be. Then that last one
+-- counts as not asked.
 ask :: [SomeBranch] -> IO ()
 ask branches = mask_ (filterM marked branches >>= go)
  where
   go [] = pure ()
-  go [SomeBranch b] = interrupt (branchThread b) (stopping b)
+  go [SomeBranch b] = interrupt (branchThread b) (stopping b) `onException` writeIORef (branchAsked b) False
   go (b : bs) = askByMessenger b >> go bs
 
 -- | Asks branches to stop, all at once, and does not wait for any to hear it.

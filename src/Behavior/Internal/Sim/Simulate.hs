@@ -18,6 +18,7 @@ import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
 import Behavior.Internal.Seam
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
+import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Sim.Watchdog
 

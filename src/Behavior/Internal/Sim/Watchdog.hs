@@ -23,7 +23,7 @@ import System.Posix.Signals (raiseSignal, sigKILL)
 #endif
 
 import Behavior.Internal.Seam (Seconds (..))
-import Behavior.Internal.Sim.Scheduler
+import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
 
 -- | The simulations to look after. The watchdog holds on to them: so GHC does not take

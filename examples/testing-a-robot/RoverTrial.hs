@@ -1,0 +1,60 @@
+-- |
+-- The trials of the rover in the tutorial "Testing a robot".
+module RoverTrial
+  ( trial
+  , well
+  , wholeMission
+  , wayHome
+  ) where
+
+import Control.Monad ((>=>))
+
+import Behavior
+import Behavior.Sim
+import Behavior.Sim.Mock
+import Rover
+
+-- | Tries what the rover is to do, with the button pressed at these times. The last
+-- argument runs it.
+trial :: (Rover -> Behavior ()) -> [(Seconds, Bool)] -> (Behavior () -> IO ()) -> IO ()
+trial task pressed run = do
+  field <- newMock
+  low <- condition field "battery low" [(0, False), (5, True)]
+  button <- condition field "red button" pressed
+  motor <- condition field "motor runs" [(0, False)]
+  on <- action field "motor on" [succeeds `causing` set motor True]
+  off <- action field "motor off" [succeeds `causing` set motor False]
+  around <- action field "drive round" [succeeds `taking` 60]
+  back <- action field "drive home" [succeeds `taking` 4]
+  beep <- action field "honk" [succeeds]
+  full <- action field "charge" [succeeds `taking` 20 `causing` set low False]
+  run . task $
+    Rover
+      { motorOn = on
+      , motorOff = off
+      , driveRound = around
+      , driveHome = back
+      , honk = beep
+      , charge = full
+      , batteryLow = signal low
+      , redButton = signal button
+      }
+  field `shouldRecord` whenever (becoming "motor runs" True) (eventually (becoming "motor runs" False))
+
+-- | What is expected of a run itself: that the behaviour returned.
+well :: Run () -> IO ()
+well run = case outcome run of
+  Returned () -> pure ()
+  other -> fail (explain other)
+
+-- | The button is pressed at the very moment when the battery becomes low.
+wholeMission :: (Rover -> Behavior ()) -> Plan -> IO Report
+wholeMission home plan =
+  explore plan $ \simulated ->
+    trial (mission home) [(0, False), (5, True)] (simulated >=> well)
+
+-- | Nothing but the way home; the button is pressed from the beginning.
+wayHome :: (Rover -> Behavior ()) -> Plan -> IO Report
+wayHome home plan =
+  explore plan $ \simulated ->
+    trial (\rover -> untilButton rover (home rover)) [(0, True)] (simulated >=> well)

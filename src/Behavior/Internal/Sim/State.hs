@@ -1,0 +1,191 @@
+-- |
+-- What a simulation is made of.
+--
+-- Each simulated thread is a real one, a 'Task', that runs only while it has the turn
+-- and otherwise waits at a gate of its own. Only who has the turn touches the state of the
+-- simulation, so that needs no locks.
+module Behavior.Internal.Sim.State
+  ( -- * Simulations
+    Sim (..)
+  , newSim
+  , Verdict (..)
+  , conclude
+
+    -- * Tasks
+  , Task (..)
+  , Place (..)
+  , Operation (..)
+  , Look (..)
+  , Unwind (..)
+
+    -- * Counting
+  , turns
+  , tick
+  , committed
+
+    -- * The record
+  , noteStep
+  , detail
+  ) where
+
+import Control.Concurrent
+import Control.Exception
+import Control.Monad (unless, when)
+import Data.IORef
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
+
+import Behavior.Internal.Seam
+import Behavior.Internal.Sim.Policy
+import Behavior.Internal.Sim.Types
+
+-- | A simulation.
+data Sim = Sim
+  { options :: !Options
+  , chooser :: !Policy
+  , capability :: !Int
+  -- ^ All tasks are on one, so that handing the turn on is cheap.
+  , current :: !(IORef Task)
+  -- ^ Who has the turn.
+  , tasks :: !(IORef (IntMap Task))
+  -- ^ Those that have not ended.
+  , nextNumber :: !(IORef Int)
+  , time :: !(IORef Seconds)
+  , counter :: !(IORef Int)
+  -- ^ The number of the scheduling point.
+  , askingAt :: !(IORef Int)
+  -- ^ Up to this point, who has the turn keeps it as long as it can go on.
+  , rotateAt :: !(IORef Int)
+  -- ^ At this point another has to have its turn.
+  , movedAt :: !(IORef Int)
+  -- ^ At this point the time moved last.
+  , commits :: !(IORef Int)
+  -- ^ How many transactions were run: what a waiting one sees may have changed.
+  , taken :: !(IORef [(Int, Int)])
+  -- ^ The decisions that were not the usual ones, the latest first.
+  , history :: !(IORef [Step])
+  -- ^ The latest first.
+  , over :: !(MVar Verdict)
+  -- ^ How the run ended. Who puts it has no turn any more.
+  , unwinding :: !(IORef Bool)
+  -- ^ The run has ended; now its tasks are.
+  , driven :: !(IORef Bool)
+  -- ^ The driver has the turn, and lends it to one task after the other.
+  , back :: !(MVar ())
+  -- ^ The driver gets the turn back.
+  , strikes :: !(IORef Int)
+  -- ^ How many operations the task that is being unwound has tried.
+  }
+
+-- | How a run ended, when it is not that the behaviour did.
+data Verdict
+  = Over
+  | Hopeless [Waiting]
+  | Standing [Label]
+  | Late
+  | Tampered [Waiting]
+  | Stuck Label Blocked
+  | Slow Label
+  | Unfit String
+
+-- | A simulated thread; or a messenger, which has no thread and only throws.
+data Task = Task
+  { taskNumber :: !Int
+  , taskLabel :: !Label
+  , taskThread :: !(Maybe ThreadId)
+  , gate :: !(MVar ())
+  , place :: !(IORef Place)
+  , raised :: !(IORef (Maybe SomeException))
+  -- ^ What was thrown to it and has arrived; it raises that when it has the turn.
+  , parent :: !Int
+  }
+
+-- | Where a task stands while it does not have the turn.
+data Place
+  = Unstarted
+  | Before !MaskingState !Operation
+  | Gone
+
+-- | What a task is about to do, as far as it matters to whether it can.
+data Operation
+  = Free
+  | Transaction (IO Bool) !(IORef Look)
+  | Moment !Seconds
+  | Delivery !Task SomeException
+
+-- | Whether a transaction would have run, when so many had been run.
+data Look = Look !Int !Bool
+
+-- | What unwinds a task when the run has ended.
+data Unwind = Unwind
+
+instance Show Unwind where
+  show Unwind = "Unwind: the simulation has ended"
+
+instance Exception Unwind where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException
+
+-- | A simulation without tasks, on the caller's capability.
+newSim :: Options -> Policy -> IO Sim
+newSim o p = do
+  (here, _) <- threadCapability =<< myThreadId
+  firstAsk <- askAt p
+  box <- newEmptyMVar
+  nowhere <- newIORef Unstarted
+  nothing <- newIORef Nothing
+  let noTask = Task (-1) (Label "nobody" "") Nothing box nowhere nothing (-1)
+  Sim o p here
+    <$> newIORef noTask
+    <*> newIORef IntMap.empty
+    <*> newIORef 0
+    <*> newIORef 0
+    <*> newIORef 0
+    <*> newIORef (min firstAsk turns)
+    <*> newIORef turns
+    <*> newIORef 0
+    <*> newIORef 0
+    <*> newIORef []
+    <*> newIORef []
+    <*> newEmptyMVar
+    <*> newIORef False
+    <*> newIORef False
+    <*> newEmptyMVar
+    <*> newIORef 0
+
+-- | For so many points one task may go on in the undisturbed schedule.
+turns :: Int
+turns = 1000
+
+-- | Ends the run. If somebody else has ended it meanwhile, the turn goes to the driver.
+conclude :: Sim -> Verdict -> IO ()
+conclude sim verdict = do
+  first <- tryPutMVar (over sim) verdict
+  unless first (putMVar (back sim) ())
+
+-- | Each decision has a number of its own.
+tick :: Sim -> IO Int
+tick sim = do
+  n <- (+ 1) <$> readIORef (counter sim)
+  writeIORef (counter sim) $! n
+  pure n
+{-# INLINE tick #-}
+
+-- | A transaction was run: what others wait for may have changed.
+committed :: Sim -> IO ()
+committed sim = do
+  n <- readIORef (commits sim)
+  writeIORef (commits sim) $! n + 1
+
+-- | Puts what the task that has the turn did on record.
+noteStep :: Sim -> Did -> IO ()
+noteStep sim what' = do
+  me <- readIORef (current sim)
+  t <- readIORef (time sim)
+  n <- readIORef (counter sim)
+  modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) what' :)
+
+-- | Likewise, if the record is to be detailed.
+detail :: Sim -> Did -> IO ()
+detail sim what' = when (detailed (options sim)) (noteStep sim what')
+{-# INLINE detail #-}

@@ -1,0 +1,93 @@
+-- |
+-- The tutorial "Testing a robot": what it shows is what there is, and what happens.
+module Examples.TestingARobotSpec (spec) where
+
+import Control.Exception (try)
+import Control.Monad (unless, (>=>))
+import Data.Foldable (for_)
+import Data.List (isInfixOf, isPrefixOf, tails)
+import Test.Hspec
+
+import Behavior.Sim
+import Rover
+import RoverTrial
+import Support (guarded)
+
+spec :: Spec
+spec = guarded $ do
+  describe "The rover" rover
+  describe "The first version" $ do
+    it "does well when nothing happens at the same time" $
+      for_ [3, 7, 12] $ \moment ->
+        trial (mission goHomeAtFirst) [(0, False), (moment, True)] (simulate >=> well)
+    it "fails under random schedules, as the page says" $
+      wholeMission goHomeAtFirst (randomly 1000) `failsAs` 1
+    it "fails under some schedule of the way home, as the page says" $
+      wayHome goHomeAtFirst (exhaustively 1) `failsAs` 2
+    it "fails again by the schedule that the page shows" $ do
+      found <- try (wayHome goHomeAtFirst (exhaustively 1))
+      again <- try (wayHome goHomeAtFirst (replaying (either failing (const Undisturbed) found)))
+      either (show . because) show again `shouldBe` either (show . because) show found
+      either (length . story) (const 0) again `shouldBe` either (length . story) (const (-1)) found
+  describe "The page" $ do
+    it "shows the modules' own text" $ do
+      modules <- traverse (fmap lines . readFile) sources
+      shown <- blocks "haskell"
+      length shown `shouldSatisfy` (>= 5)
+      for_ shown $ \block -> block `shouldSatisfy` \text -> any (text `isInfixOf`) modules
+    it "shows what exploring the mended version says" $ do
+      said <- traverse (fmap show) [wholeMission goHome (randomly 1000), wayHome goHome (exhaustively 2)]
+      shown <- drop 2 <$> blocks "text"
+      concat shown `shouldBe` said
+ where
+  sources =
+    [ "examples/testing-a-robot/Rover.hs"
+    , "examples/testing-a-robot/RoverTrial.hs"
+    , "test/Examples/TestingARobotSpec.hs"
+    ]
+
+rover :: Spec
+rover = do
+  it "stops its motor, whenever the button is pressed" $
+    for_ [3, 7, 12] $ \moment ->
+      trial (mission goHome) [(0, False), (moment, True)] (simulate >=> well)
+
+  it "stops its motor, whichever thread is quicker" $ do
+    tried <- wholeMission goHome (randomly 1000)
+    tried `shouldSatisfy` complete
+
+  it "stops its motor on the way home, under every schedule with two pre-emptions" $ do
+    tried <- wayHome goHome (exhaustively 2)
+    tried `shouldSatisfy` complete
+
+  it "stops its motor in reality" $
+    trial (\it' -> untilButton it' (goHome it')) [(0, True)] id
+
+-- | It is not as expected, and says so word for word as the text of this number on the page.
+failsAs :: IO Report -> Int -> Expectation
+failsAs exploration n = do
+  said <- either show (("nothing fails: " ++) . show) <$> (try exploration :: IO (Either Counterexample Report))
+  shown <- blocks "text"
+  for_ (take 1 (drop (n - 1) shown ++ [[]])) $ \text ->
+    unless (pieces text `inOrder` lines said) (said `shouldBe` unlines text)
+
+-- | The page leaves out lines where it has three dots at the margin.
+pieces :: [String] -> [[String]]
+pieces text = case break (== "...") text of
+  (piece, _ : more) -> piece : pieces more
+  (piece, []) -> [piece]
+
+-- | Whether the text consists of these pieces, with anything in between.
+inOrder :: [[String]] -> [String] -> Bool
+inOrder [] text = null text
+inOrder [piece] text = piece == text
+inOrder (piece : more) text =
+  piece `isPrefixOf` text && any (inOrder more) (tails (drop (length piece) text))
+
+-- | The blocks of code on the page in this language.
+blocks :: String -> IO [[String]]
+blocks language = go . lines <$> readFile "docs/testing-a-robot.md"
+ where
+  go text = case dropWhile (/= ("```" ++ language)) text of
+    [] -> []
+    _ : inside -> let (block, rest) = break (== "```") inside in block : go rest

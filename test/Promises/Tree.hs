@@ -1,0 +1,133 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Random behaviours in which every operator is nested in every other.
+module Promises.Tree
+  ( Program (..)
+  , Tree (..)
+  , Look (..)
+  , programsOf
+  , Root (..)
+  ) where
+
+import Control.Exception (MaskingState (..))
+import Test.QuickCheck (Gen, choose, elements, frequency, oneof, shuffle, vectorOf)
+
+import Promises.Stage
+
+-- | A behaviour; what is done to it from outside, and when (the world is a number, which
+-- the conditions look at); and in which masking state it is called.
+data Program = Program Tree [(Int, Deed Int)] MaskingState
+  deriving (Show)
+
+data Tree
+  = Leaf Act
+  | Fallback Tree Tree
+  | Attempt Int Tree
+  | Parallel Tree Tree
+  | Both Tree Tree
+  | FirstOf [Tree]
+  | AllOf [Tree]
+  | Beside [Tree] Tree
+  | Select Look Tree Tree
+  | Monitor Look Tree Tree
+  | WhileHolding Look Tree
+  | Timeout Int Tree
+  deriving (Show)
+
+-- | Whether a condition is watched, or polled so often.
+data Look = Watched | Polled Int
+  deriving (Show)
+
+-- | Which operators may stand at the root.
+data Root = AnyRoot | ReactiveRoot
+  deriving (Eq)
+
+programsOf :: Root -> Size -> Gen Program
+programsOf root size = case size of
+  Full -> Program <$> (numbered <$> tree 2) <*> deeds <*> states
+  -- With a caller of its own there is room for one branch; without, for two.
+  Tiny ->
+    oneof
+      [ Program <$> (numbered <$> tree' narrow 1) <*> deeds <*> states
+      , Program <$> (numbered <$> tree' wide 1) <*> pure [] <*> states
+      ]
+ where
+  states = frequency [(4, pure Unmasked), (1, pure MaskedInterruptible), (1, pure MaskedUninterruptible)]
+  deeds = do
+    changes <- choose someChanges >>= \n -> vectorOf n (Changes <$> choose (0, 3))
+    cancels <- frequency [(1, pure 0), (3, pure 1), (2, pure 2)] >>= \n -> pure (replicate n CancelsIt)
+    order <- shuffle (changes ++ cancels)
+    traverse (\deed -> (\after -> (after, deed)) <$> choose (0, 2)) order
+
+  someChanges = case size of
+    Tiny -> (0, 1)
+    Full -> if root == ReactiveRoot then (1, 4) else (0, 3)
+
+  tree :: Int -> Gen Tree
+  tree n = oneof (reactive n ++ (if root == ReactiveRoot then [] else concurrent n))
+  tree' kinds n = oneof (kinds n)
+  -- Where something is to be lost, often something is there.
+  leaf
+    | root == ReactiveRoot = (\act how -> Leaf act {aftermath = how}) <$> acts 0 <*> elements [minBound ..]
+    | otherwise = Leaf <$> acts 0
+  within' :: Int -> Gen Tree
+  within' 0 = leaf
+  within' n =
+    frequency
+      [ (3, leaf)
+      , (1, Fallback <$> within' (n - 1) <*> within' (n - 1))
+      , (1, Attempt <$> choose (1, 3) <*> within' (n - 1))
+      , (3, oneof (reactive n ++ concurrent n))
+      ]
+  less n = within' (n - 1)
+  looks = if size == Tiny then pure Watched else frequency [(3, pure Watched), (1, Polled <$> choose (1, 2))]
+  reactive n =
+    [ Select <$> looks <*> less n <*> less n
+    , Monitor <$> looks <*> less n <*> less n
+    , WhileHolding <$> looks <*> less n
+    ]
+      ++ [Timeout <$> choose (0, 3) <*> less n | size == Full]
+  concurrent n =
+    [ Parallel <$> less n <*> less n
+    , Both <$> less n <*> less n
+    , FirstOf <$> several (less n)
+    , AllOf <$> several (less n)
+    , Beside <$> (choose (1, 2) >>= \k -> vectorOf k (less n)) <*> less n
+    ]
+  several g = choose (1, 3) >>= \k -> vectorOf k g
+  narrow n
+    | root == ReactiveRoot = reactive n
+    | otherwise = reactive n ++ [FirstOf . pure <$> less n, AllOf . pure <$> less n]
+  wide n
+    | root == ReactiveRoot = [Timeout <$> choose (0, 3) <*> less n, Monitor (Polled 1) <$> less n <*> less n]
+    | otherwise =
+        [ Timeout <$> choose (0, 3) <*> less n
+        , Parallel <$> less n <*> less n
+        , Both <$> less n <*> less n
+        , FirstOf <$> vectorOf 2 (less n)
+        , AllOf <$> vectorOf 2 (less n)
+        , Beside <$> vectorOf 1 (less n) <*> less n
+        ]
+
+-- | Gives every leaf a number of its own.
+numbered :: Tree -> Tree
+numbered = snd . go 1
+ where
+  go :: Int -> Tree -> (Int, Tree)
+  go n = \case
+    Leaf act -> (n + 1, Leaf act {number = n})
+    Fallback a b -> two Fallback n a b
+    Attempt k a -> Attempt k <$> go n a
+    Parallel a b -> two Parallel n a b
+    Both a b -> two Both n a b
+    FirstOf as -> FirstOf <$> all' n as
+    AllOf as -> AllOf <$> all' n as
+    Beside as b -> let (m, as') = all' n as in Beside as' <$> go m b
+    Select l a b -> two (Select l) n a b
+    Monitor l a b -> two (Monitor l) n a b
+    WhileHolding l a -> WhileHolding l <$> go n a
+    Timeout k a -> Timeout k <$> go n a
+  two f n a b = let (m, a') = go n a in f a' <$> go m b
+  all' n [] = (n, [])
+  all' n (a : as) = let (m, a') = go n a in (a' :) <$> all' m as

@@ -1,0 +1,89 @@
+-- |
+-- Tries the promises and the specification for as long as it is told, ever new programs
+-- under ever new schedules, and says what it covered.
+--
+-- > soak 600
+--
+-- It begins with all that is asked of a release, however long that takes: a hundred
+-- thousand random schedules of each promise, and as many random programs compared with the
+-- specification. Without a number of seconds it ends with that.
+module Main (main) where
+
+import Control.Monad (forM, forM_, unless, when)
+import Data.Maybe (catMaybes)
+import GHC.Clock (getMonotonicTime)
+import Numeric (showFFloat)
+import System.Environment (getArgs)
+import System.Exit (die, exitFailure)
+import System.IO (BufferMode (..), hSetBuffering, stdout)
+import Test.QuickCheck (Args (..), Property, isSuccess, numTests, quickCheckWithResult, stdArgs)
+
+import Promises.Broken
+import Promises.Language (sound)
+import Promises.Properties
+import Promises.Stage
+import Promises.Trying
+import SemanticsSpec (allThatIsAllowed, onlyWhatIsAllowed)
+
+main :: IO ()
+main = do
+  hSetBuffering stdout LineBuffering
+  arguments <- getArgs
+  begun <- getMonotonicTime
+  seconds <- case map reads arguments of
+    [] -> pure 0
+    [[(n, "")]] | n >= 0 -> pure (n :: Double)
+    _ -> die "soak: the argument is how many seconds it should take, 600 say"
+  let rounds n total = do
+        tried <- oneRound n
+        spent <- subtract begun <$> getMonotonicTime
+        let covered = total <> tried
+        putStrLn ("-- after " ++ show n ++ " rounds and " ++ secs spent ++ ": " ++ show covered)
+        when (spent < seconds) (rounds (n + 1) covered)
+  putStrLn "-- broken operators: after so many schedules, on average of 20 seeds, one is rejected"
+  forM_ mutants reject
+  rounds (1 :: Int) mempty
+
+-- | The n-th round, whose programs and schedules are new.
+oneRound :: Int -> IO Tried
+oneRound n = do
+  putStrLn ("-- round " ++ show n)
+  promised' <- forM promises $ \promise -> do
+    putStrLn (promised promise)
+    (<>)
+      <$> timed "random schedules" (underRandom (1 + 5000 * (n - 1)) 100000 sound promise)
+      <*> timed "all schedules with up to two pre-emptions" (underAll (1 + 300 * (n - 1)) 2 100000 300 sound promise)
+      <* timed "in reality, 500 programs" (inReality (1 + 500 * (n - 1)) 500 sound promise)
+  putStrLn "The specification"
+  checks "random programs, each run a path of the relation" 100000 onlyWhatIsAllowed
+  checks "small programs, both sets of outcomes the same" 500 allThatIsAllowed
+  pure (mconcat promised')
+
+checks :: String -> Int -> Property -> IO ()
+checks name n prop = do
+  begun <- getMonotonicTime
+  result <- quickCheckWithResult stdArgs {maxSuccess = n, maxSize = 100} prop
+  ended <- getMonotonicTime
+  putStrLn ("  " ++ name ++ ": " ++ show (numTests result) ++ " programs, " ++ secs (ended - begun))
+  unless (isSuccess result) exitFailure
+
+timed :: Show a => String -> IO a -> IO a
+timed name act = do
+  begun <- getMonotonicTime
+  a <- act
+  ended <- getMonotonicTime
+  putStrLn ("  " ++ name ++ ": " ++ show a ++ ", " ++ secs (ended - begun))
+  pure a
+
+secs :: Double -> String
+secs t = showFFloat (Just 1) t " s"
+
+-- | How soon a broken operator is noticed.
+reject :: Mutant -> IO ()
+reject mutant = do
+  numbers <- catMaybes <$> traverse (\seed -> firstRejection 20000 seed (spoken mutant) (breaks mutant)) [1 .. 20]
+  let mean = sum numbers `div` max 1 (length numbers)
+  putStrLn ("  " ++ padded (show mean) ++ "  " ++ what mutant ++ " (" ++ promised (breaks mutant) ++ ")")
+  unless (length numbers == 20) $ putStrLn "not noticed by every seed" >> exitFailure
+ where
+  padded text = replicate (6 - length text) ' ' ++ text
