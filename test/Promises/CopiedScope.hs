@@ -166,7 +166,7 @@ ask :: [SomeBranch] -> IO ()
 ask branches = mask_ (filterM unasked branches >>= go)
  where
   go [] = pure ()
-  go [SomeBranch (Branch thread _ _)] = interrupt thread (Stop thread)
+  go [SomeBranch (Branch thread _ _)] = uninterruptibleMask_ (interrupt thread (Stop thread))
   go (b : bs) = askByMessenger b >> go bs
 
 askWithoutWaiting :: [SomeBranch] -> IO ()
