@@ -58,9 +58,9 @@
 --   matters: before and after a call to hardware, say.
 -- * Waiting by other means ('Control.Concurrent.threadDelay', an @MVar@, threads of
 --   @forkIO@ or @async@) is not simulated. A run that waits so is ended, and 'explain' says what to use
---   instead. (If it waits for less than a few hundredths of a second, that goes
+--   instead. (If it waits for less than half a second, that goes
 --   unnoticed. So does 'System.Timeout.timeout' around something that is simulated: it counts
---   real time.)
+--   real time.) To print is fine, as long as somebody reads.
 -- * Clocks, random numbers and finalizers of your own are as they are.
 --
 -- A loop that never allocates can be stopped by nobody. It ends the process after

@@ -156,7 +156,7 @@ atomicallyFirmly transaction = uninterruptibleMask_ waiting
 --
 -- >>> checkpoint
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 checkpoint :: IO ()
 checkpoint = inSimulation (pure ()) pause
 

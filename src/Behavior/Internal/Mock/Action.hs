@@ -45,7 +45,7 @@ import Behavior.Internal.Mock.World
 -- >>> action mock "close door" [] :: IO (Behavior ())
 -- *** Exception: action "close door": at least one script is needed; the last one repeats for ever
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 action :: Mock -> String -> [Script a] -> IO (Behavior a)
 action mock name scripts = do
   checkScripts ("action " ++ show name) scripts
@@ -61,7 +61,7 @@ action mock name scripts = do
 -- "back"
 -- >>> mock `shouldRecord` failureOf "leave by \"front\"" `comesBefore` startOf "leave by \"back\""
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 actionOn :: Show x => Mock -> String -> (x -> [Script a]) -> IO (x -> Behavior a)
 actionOn mock name scripts = do
   christen mock "action" name
@@ -82,7 +82,7 @@ actionOn mock name scripts = do
 -- >>> Signal.waitUntil ((== 5) <$> Signal.polling 0.001 (camera ? camera))
 -- >>> mock `shouldRecord` failureOf "camera" `comesBefore` becoming "camera" 5
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 sensor :: Show a => Mock -> String -> [Script a] -> IO (Behavior a)
 sensor mock name scripts = do
   checkScripts ("sensor " ++ show name) scripts

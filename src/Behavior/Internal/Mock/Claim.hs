@@ -39,7 +39,7 @@ import Behavior.Internal.Runtime (Seconds)
 -- existence, absence, bounded existence, universality, precedence and response. A
 -- record is all that happened: what is not on it has not come in time.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Claim = Claim
   { claimWords :: String
   , claimNames :: [String]
@@ -60,7 +60,7 @@ instance Monoid Claim where
 
 -- | It happens, at least once.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 eventually :: Moment -> Claim
 eventually = withinSeconds (1 / 0)
 
@@ -79,7 +79,7 @@ eventually = withinSeconds (1 / 0)
 --   > 5.0 s  charge: begins
 --     9.0 s  charge: done
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 withinSeconds :: Seconds -> Moment -> Claim
 withinSeconds limit m
   | limit >= 0 = claimOf (term ++ momentWords m) m $ \(Origin _ since) found -> case found of
@@ -95,7 +95,7 @@ withinSeconds limit m
 
 -- | It does not happen.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 never :: Moment -> Claim
 never m = claimOf ("never " ++ momentWords m) m $ \_ found -> case found of
   [] -> Nothing
@@ -103,7 +103,7 @@ never m = claimOf ("never " ++ momentWords m) m $ \_ found -> case found of
 
 -- | It happens exactly so many times.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 exactly :: Int -> Moment -> Claim
 exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords m) m $ \_ found ->
   if length found == times then Nothing else Just ("it was so " ++ show (length found) ++ " times", found)
@@ -113,7 +113,7 @@ exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords 
 -- >>> holds (whenever (startOf "charge") (always (being "low" True))) record
 -- True
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 always :: Stretch -> Claim
 always s = Claim ("always " ++ spanWords s) (spanNames s) $ \rows (Origin origin _) ->
   let isInside n = any (\(from, to) -> from <= n && n < to) (stretches s rows)
@@ -139,7 +139,7 @@ always s = Claim ("always " ++ spanWords s) (spanNames s) $ \rows (Origin origin
 --     5.0 s  charge: begins
 --     9.0 s  charge: done
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 comesBefore :: Moment -> Moment -> Claim
 comesBefore a b =
   Claim (momentWords a ++ " before " ++ momentWords b) (momentNames a ++ momentNames b) $ \rows (Origin origin _) ->
@@ -157,7 +157,7 @@ infix 7 `comesBefore`
 -- > whenever (becoming "low" True) (withinSeconds 2 (startOf "charge"))
 -- > whenever (faultOf "motor") (never (startOf "drive"))
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 whenever :: Moment -> Claim -> Claim
 whenever m claim =
   Claim words' (momentNames m ++ claimNames claim) $ \rows (Origin origin _) ->
@@ -182,7 +182,7 @@ time = happenedAt . snd
 -- @record \`shouldSatisfy\` holds claim@. ('Behavior.Sim.Mock.shouldRecord' says why
 -- it does not.)
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 holds :: Claim -> Record -> Bool
 holds claim = either (const False) (const True) . verdict claim
 
@@ -195,7 +195,7 @@ holds claim = either (const False) (const True) . verdict claim
 -- This does not hold: never "chrage" begins.
 -- Nothing in this world is called "chrage", only "low", "drive", "charge".
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 verdict :: Claim -> Record -> Either String ()
 verdict claim record = case (strangers, broken claim (numbered record) (Origin (-1) 0)) of
   (name : _, _) ->

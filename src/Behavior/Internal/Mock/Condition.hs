@@ -35,7 +35,7 @@ import Behavior.Internal.Mock.World
 -- | Something in the world that changes, by itself at certain times, or because
 -- somebody 'set's it.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Condition a = Condition
   { world :: Mock
   , nameOf :: String
@@ -64,7 +64,7 @@ data Condition a = Condition
 -- >>> condition mock "door open" [(5, True), (2, False)] >>= reading
 -- *** Exception: condition "door open": the times of the changes start from zero and increase; 2.0 must not come after 5.0
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 condition :: Show a => Mock -> String -> [(Seconds, a)] -> IO (Condition a)
 condition mock name = unsteady mock name . map (fmap Just)
 
@@ -74,7 +74,7 @@ condition mock name = unsteady mock name . map (fmap Just)
 -- >>> Signal.waitUntil ((== 'b') <$> signal beacon)
 -- *** Exception: FailedBecause "beacon has no value any more"
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 unsteady :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
 unsteady mock name changes = do
   -- Of endlessly many only so many can be looked at beforehand.
@@ -134,7 +134,7 @@ upToDate c transaction = do
 -- Like every signal it waits for its first value, and fails its operator when the
 -- value is lost.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 signal :: Condition a -> Signal a
 signal c = Signal $ do
   changesByItself <- upToDate c (\_ _ -> (,) . not . null <$> readTVar (ahead c) <*> pure [])
@@ -166,7 +166,7 @@ signal c = Signal $ do
 -- >>> rSelect (reading warm) (pure "swim") (pure "run")
 -- "swim"
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 reading :: Condition a -> Behavior a
 reading c =
   upToDate c (\_ _ -> (,) <$> readTVar (current c) <*> pure [])
@@ -180,7 +180,7 @@ reading c =
 -- >>> reading wet
 -- True
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 set :: Condition a -> a -> Behavior ()
 set c = change c . Just
 
@@ -191,7 +191,7 @@ set c = change c . Just
 -- >>> reading gps ? pure "lost"
 -- "lost"
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 lose :: Condition a -> Behavior ()
 lose c = change c Nothing
 

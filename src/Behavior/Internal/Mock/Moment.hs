@@ -45,7 +45,7 @@ type Lines = [(Int, Entry)]
 
 -- | What kind of thing may have happened, once or often: @startOf "recharge"@.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Moment = Moment
   { momentWords :: String
   , momentNames :: [String]
@@ -55,25 +55,25 @@ data Moment = Moment
 -- | The action begins. For an action with an argument the name alone means whatever
 -- argument, and @"open \\"front\\""@ that one.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 startOf :: String -> Moment
 startOf = momentOf "begins" (== Begins)
 
 -- | The action ends, however that may be, cleanup included.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 endOf :: String -> Moment
 endOf = momentOf "ends" isEnd
 
 -- | The action returns its result.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 successOf :: String -> Moment
 successOf = momentOf "is done" (== Succeeds)
 
 -- | The action (or its cleanup) fails, or the sensor does.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 failureOf :: String -> Moment
 failureOf = momentOf "fails" isFailing
  where
@@ -82,7 +82,7 @@ failureOf = momentOf "fails" isFailing
 
 -- | The action (or its cleanup) faults, or the sensor does.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 faultOf :: String -> Moment
 faultOf = momentOf "faults" isFaulting
 
@@ -92,19 +92,19 @@ isFaulting _ = False
 
 -- | The action hears that it is to stop.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 interruptionOf :: String -> Moment
 interruptionOf = momentOf "is asked to stop" (== AskedToStop)
 
 -- | The condition, or what the sensor reads, becomes this; or is this from the start.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 becoming :: Show a => String -> a -> Moment
 becoming name value = momentOf ("becomes " ++ show value) (`elem` [Is (show value), Becomes (show value)]) name
 
 -- | Somebody has said this by 'Behavior.Sim.Mock.remark'.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 remarked :: String -> Moment
 remarked text = (momentOf "is remarked" (== Remarked) text) {momentNames = []}
 
@@ -132,7 +132,7 @@ isEnd what = case what of
 -- >>> count (anyOf [startOf "drive", startOf "charge"]) record
 -- 2
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 anyOf :: [Moment] -> Moment
 anyOf ms =
   Moment
@@ -162,7 +162,7 @@ merged xs ys = xs ++ ys
 --     5.0 s  charge: begins
 --     ...
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 during :: Moment -> Stretch -> Moment
 during = restricted "while" id
 
@@ -171,7 +171,7 @@ during = restricted "while" id
 -- >>> holds (never (startOf "charge" `outside` being "low" True)) record
 -- True
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 outside :: Moment -> Stretch -> Moment
 outside = restricted "unless" not
 
@@ -192,7 +192,7 @@ restricted word wanted m s =
 -- >>> holds (never (running "drive" `overlapping` running "charge")) record
 -- True
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 overlapping :: Stretch -> Stretch -> Moment
 overlapping a b =
   (anyOf [starts a `during` b, starts b `during` a]) {momentWords = spanWords a ++ " while " ++ spanWords b}
@@ -207,7 +207,7 @@ infixl 8 `during`, `outside`, `overlapping`
 -- >>> count (startOf "drive") record
 -- 1
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 count :: Moment -> Record -> Int
 count m = length . occurrences m . numbered
 
@@ -217,7 +217,7 @@ numbered = zip [0 ..] . entries
 
 -- | What goes on for a while.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Stretch = Stretch
   { spanWords :: String
   , spanNames :: [String]
@@ -227,7 +227,7 @@ data Stretch = Stretch
 
 -- | The action runs: from its beginning to its end, cleanup included.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 running :: String -> Stretch
 running name =
   Stretch (show name ++ " is running") [name] $
@@ -236,7 +236,7 @@ running name =
 
 -- | The condition, or what the sensor reads, is this.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 being :: Show a => String -> a -> Stretch
 being name value =
   Stretch (show name ++ " is " ++ show value) [name] $

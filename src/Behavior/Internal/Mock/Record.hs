@@ -17,7 +17,7 @@ import Behavior.Internal.Runtime (Seconds)
 -- | What has happened in a mock world, in the order in which it happened. It is
 -- shown as a timeline, one line an entry.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Record = Record
   { subjects :: [String]
   -- ^ The names of all that is in the world, whether or not anything became of it.
@@ -31,7 +31,7 @@ instance Show Record where
 
 -- | One thing that has happened.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Entry = Entry
   { happenedAt :: Seconds
   -- ^ When: in seconds since the clock of the world was started.
@@ -66,7 +66,7 @@ instance Show Entry where
 
 -- | What can happen to the things of a mock world.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Happening
   = -- | An action begins.
     Begins

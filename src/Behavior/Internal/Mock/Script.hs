@@ -45,7 +45,7 @@ import Behavior.Internal.Runtime (Seconds, duration)
 -- > fails "locked" `taking` 0.5
 -- > succeeds `taking` 20 `causing` set batteryLow False `slowToStop` 2
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Script a = Script
   { lasts :: Seconds
   , effect :: Behavior ()
@@ -66,7 +66,7 @@ data Stopping
 --
 -- > succeeds  =  returning ()
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 succeeds :: Script ()
 succeeds = returning ()
 
@@ -76,7 +76,7 @@ succeeds = returning ()
 -- >>> look >> look
 -- "a dog"
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 returning :: a -> Script a
 returning = ending . Right
 
@@ -88,34 +88,34 @@ ending how = Script {lasts = 0, effect = pure (), end = how, stopping = CleansUp
 -- >>> open <- action mock "open door" [fails "locked", succeeds]
 -- >>> open ? open
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 fails :: String -> Script a
 fails = throws . FailedBecause
 
--- | Faults at once: throws an 'ErrorCall', as a bug would.
+-- | Faults at once: throws an 'Control.Exception.ErrorCall', as a bug would.
 --
 -- >>> drive <- action mock "drive" [faults "wheel came off" :: Script ()]
 -- >>> drive ? putStrLn "a fault is never recovered from"
 -- *** Exception: wheel came off
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 faults :: String -> Script a
 faults = throws . ErrorCall
 
 -- | Throws an exception of your own at once. It is on record as a failure if it is
--- one ('BehaviorFailed'), else as a fault.
+-- one (a 'Behavior.BehaviorFailed'), else as a fault.
 --
 -- >>> grasp <- action mock "grasp" [throws (userError "no hand") :: Script ()]
 -- >>> grasp
 -- *** Exception: user error (no hand)
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 throws :: Exception e => e -> Script a
 throws = ending . Left . toException
 
 -- | Goes on for ever, until it is asked to stop.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 hangs :: Script a
 hangs = faults "the end of all time has come" `taking` (1 / 0)
 
@@ -131,13 +131,13 @@ hangs = faults "the end of all time has come" `taking` (1 / 0)
 --
 -- A negative number is refused by what the script is given to, as is NaN.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 taking :: Script a -> Seconds -> Script a
 taking script seconds = script {lasts = lasts script + seconds}
 
 -- | Does this to the world when its time is over, right before it ends.
 --
--- It runs with exceptions masked; what it throws, the action throws. Mostly it 'set's
+-- It runs with exceptions masked; what it throws, the action throws. Mostly it 'Behavior.Sim.Mock.set's
 -- a condition. An action that is stopped before its time is over causes nothing.
 --
 -- >>> low <- condition mock "battery low" [(0, True)]
@@ -145,14 +145,14 @@ taking script seconds = script {lasts = lasts script + seconds}
 -- >>> recharge >> reading low
 -- False
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 causing :: Script a -> Behavior () -> Script a
 causing script more = script {effect = effect script >> more}
 
 -- | When it is asked to stop, it cleans up for so many seconds (zero or more), and
 -- cannot be interrupted there. Said twice, it adds up.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 slowToStop :: Script a -> Seconds -> Script a
 slowToStop script seconds = case stopping script of
   CleansUp s instead -> script {stopping = CleansUp (s + seconds) instead}
@@ -161,14 +161,14 @@ slowToStop script seconds = case stopping script of
 -- | When it is asked to stop, its cleanup fails for this reason, which takes the place
 -- of the cancellation.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 failsStopping :: Script a -> String -> Script a
 failsStopping script = throwsStopping script . FailedBecause
 
 -- | When it is asked to stop, its cleanup faults, which takes the place of the
 -- cancellation.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 faultsStopping :: Script a -> String -> Script a
 faultsStopping script = throwsStopping script . ErrorCall
 
@@ -181,7 +181,7 @@ throwsStopping script e = case stopping script of
 -- interrupted any more: it ends as it would have ended, and as late. (So nothing stops
 -- one that 'hangs'.)
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 completesAnyway :: Script a -> Script a
 completesAnyway script = script {stopping = GoesOn}
 

@@ -41,7 +41,7 @@ import Behavior.Internal.Runtime
 -- | A world in which nothing is real, and the record of what happens there. One world
 -- is for one run.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Mock = Mock
   { origin :: IORef (Maybe Seconds)
   -- ^ When the world's clock was started.
@@ -54,7 +54,7 @@ data Mock = Mock
 
 -- | An empty world.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 newMock :: IO Mock
 newMock = Mock <$> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
 
@@ -63,7 +63,7 @@ newMock = Mock <$> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef
 --
 -- >>> begin mock
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 begin :: Mock -> Behavior ()
 begin = void . clock
 
@@ -86,7 +86,7 @@ tell mock entry = do
 -- >>> remark mock "a sheep crosses the road"
 -- >>> mock `shouldRecord` eventually (remarked "a sheep crosses the road")
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 remark :: Mock -> String -> Behavior ()
 remark mock text = do
   (zero, t) <- clock mock
@@ -113,7 +113,7 @@ foretell mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
 -- >>> map happening . entries <$> happened mock
 -- [Begins,Succeeds]
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 happened :: Mock -> IO Record
 happened mock = do
   seen <- readIORef (noted mock)
@@ -130,7 +130,7 @@ happened mock = do
 -- It never came.
 -- <BLANKLINE>
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 shouldRecord :: Mock -> Claim -> IO ()
 shouldRecord mock claim = happened mock >>= either (throwIO . BrokenClaim) pure . verdict claim
 
@@ -138,7 +138,7 @@ infix 1 `shouldRecord`
 
 -- | A claim that does not hold, and why; it is shown to be read.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 newtype BrokenClaim = BrokenClaim String
 
 instance Show BrokenClaim where

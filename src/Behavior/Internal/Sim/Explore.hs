@@ -32,7 +32,7 @@ import Behavior.Internal.Sim.Types
 
 -- | Which schedules to run, and how.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Plan = Plan
   { search :: Search
   , under :: Options
@@ -41,7 +41,7 @@ data Plan = Plan
 
 -- | Which schedules to run.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Search
   = -- | So many random ones, from this seed. Each has few pre-emptions or many.
     Random Int Int
@@ -55,7 +55,7 @@ data Search
 --
 -- > randomly n  =  Plan (Random n 0) defaults
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 randomly :: Int -> Plan
 randomly n = Plan (Random n 0) defaults
 
@@ -63,19 +63,19 @@ randomly n = Plan (Random n 0) defaults
 -- for small behaviours. (To go on with another thread where one has to wait is no
 -- pre-emption: such choices are all made.)
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 exhaustively :: Int -> Plan
 exhaustively k = Plan (Exhaustive k 1000000) defaults
 
 -- | Only this schedule, told in detail: what a 'Counterexample' says, to see it again.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 replaying :: Schedule -> Plan
 replaying s = Plan (Replay s) defaults {detailed = True}
 
 -- | What was explored.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Report = Report
   { schedules :: Int
   -- ^ How many schedules were run.
@@ -95,7 +95,7 @@ instance Show Report where
 --
 -- Its text says what went wrong, what happened up to then, and how to replay it.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Counterexample = Counterexample
   { failing :: Schedule
   , because :: SomeException
@@ -155,7 +155,7 @@ data Trial = Trial
 -- >>> complete report
 -- True
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 explore :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Report
 explore plan property =
   exploring plan property >>= \case
@@ -164,7 +164,7 @@ explore plan property =
 
 -- | 'explore' that gives the counterexample.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 exploring
   :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
 exploring (Plan how o) property = case how of

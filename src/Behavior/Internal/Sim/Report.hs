@@ -17,7 +17,7 @@ import Behavior.Internal.Sim.Types
 
 -- | How a run ended, in words; and if it is a mistake, what to do about it.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 explain :: Outcome a -> String
 explain = \case
   Returned _ -> "it returned"
@@ -44,7 +44,8 @@ explain = \case
 instead :: Blocked -> String
 instead = \case
   InMVar ->
-    "at an MVar or for the time (takeMVar, threadDelay, System.Timeout.timeout, forkIO and a wait for it): \
+    "at an MVar or for the time (takeMVar, threadDelay, System.Timeout.timeout, forkIO and a wait for it, \
+    \output that nobody reads): \
     \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
   InTransaction ->
     "in a transaction (Control.Concurrent.STM.atomically, or async's wait, race, concurrently): \
@@ -56,7 +57,7 @@ instead = \case
 
 -- | What happened, a line for each step (what repeats itself is told once).
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 narrate :: [Step] -> String
 narrate made = unlines (map (line . head) (groupBy repeated made))
  where

@@ -26,13 +26,13 @@ import Behavior.Internal.Sim.Watchdog
 --
 -- > simulate  =  simulateWith defaults
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 simulate :: Behavior a -> IO (Run a)
 simulate = simulateWith defaults
 
 -- | 'simulate' as the options say.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 simulateWith :: Options -> Behavior a -> IO (Run a)
 simulateWith o act = do
   chooser' <- policy (scheduled o)

@@ -21,7 +21,7 @@ import Behavior.Internal.Seam (Label, Seconds)
 
 -- | How to simulate.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Options = Options
   { scheduled :: Schedule
   -- ^ Which thread runs when several could.
@@ -39,7 +39,7 @@ data Options = Options
 
 -- | The undisturbed schedule, no end, and the limits that are said with each of 'Options'.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 defaults :: Options
 defaults =
   Options
@@ -52,7 +52,7 @@ defaults =
 
 -- | Which thread runs when several could.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Schedule
   = -- | A thread runs until it has to wait; then it is the turn of the next that can run,
     -- round and round.
@@ -66,7 +66,7 @@ data Schedule
 
 -- | What came of a simulated run.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Run a = Run
   { outcome :: Outcome a
   , finished :: Seconds
@@ -83,7 +83,7 @@ data Run a = Run
 
 -- | How a simulated run ended.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Outcome a
   = -- | The behaviour returned.
     Returned a
@@ -110,7 +110,7 @@ data Outcome a
 
 -- | Who waits for what.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Waiting = Waiting
   { who :: Label
   , what :: String
@@ -119,7 +119,7 @@ data Waiting = Waiting
 
 -- | In what a thread waited, when it was not by this library.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Blocked
   = -- | An @MVar@, or the time: @takeMVar@, @threadDelay@, @System.Timeout@.
     InMVar
@@ -133,7 +133,7 @@ data Blocked
 
 -- | One thing that happened.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Step = Step
   { at :: !Seconds
   , point :: !Int
@@ -147,7 +147,7 @@ data Step = Step
 
 -- | What a thread did, or what was done to it.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 data Did
   = Starts
   | Ends

@@ -87,8 +87,8 @@ look sim before = do
       | n == atPoint sight, Just how <- blocked status -> do
           let seen = sight {waits = waits sight + 1}
           -- Whoever was to be unwound, and waits elsewhere for it, is left behind.
-          when (waits seen >= 200) (void (tryPutMVar (back sim) ()))
-          if waits seen < 5 then pure seen else tell seen (Stuck (taskLabel runner) how)
+          when (waits seen >= 400) (void (tryPutMVar (back sim) ()))
+          if waits seen < 100 then pure seen else tell seen (Stuck (taskLabel runner) how)
       | otherwise -> pure sight {atPoint = n, waits = 0}
  where
   Seconds allowed = patience (options sim)

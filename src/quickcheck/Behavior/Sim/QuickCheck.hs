@@ -38,14 +38,14 @@ import Behavior.Sim
 -- What the property gives may be anything that QuickCheck can test; it may also throw. Then
 -- the schedule is shrunk, and told as a 'Counterexample'.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 underSchedules :: Testable prop => ((Behavior a -> IO (Run a)) -> IO prop) -> Property
 underSchedules = underSchedulesOf 1
 
 -- | 'underSchedules' that tries so many schedules for each test: of use when what is
 -- generated around it is costly, or more interesting than the schedules.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 underSchedulesOf :: Testable prop => Int -> ((Behavior a -> IO (Run a)) -> IO prop) -> Property
 underSchedulesOf n body =
   -- The seed is not shrunk: the schedule is, and better.
@@ -72,25 +72,25 @@ instance Exception DoesNotHold
 
 -- | Any random schedule.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 anySchedule :: Gen Schedule
 anySchedule = Seeded <$> chooseAny
 
 -- | Leaves out switches.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 shrinkSchedule :: Schedule -> [Schedule]
 shrinkSchedule (Switching switches) = Switching <$> shrinkList (const []) switches
 shrinkSchedule _ = [Undisturbed]
 
 -- | Two durations that are often the same.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 durations :: Gen (Seconds, Seconds)
 durations = (,) <$> duration <*> duration
 
 -- | A duration of 0, 1, 2... up to 5 seconds: so that ties are frequent.
 --
--- @since 0.2.0.0
+-- @since 0.1.0.0
 duration :: Gen Seconds
 duration = fromIntegral <$> choose (0, 5 :: Int)
