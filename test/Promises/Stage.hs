@@ -47,11 +47,12 @@ import Behavior (Behavior, Seconds, sleep)
 import Behavior.Internal.Failure (isCancellation)
 import Behavior.Internal.Runtime
   ( Label (..)
-  , Thread (..)
+  , Thread (threadId)
   , atomically
   , checkpoint
   , interruptByMessenger
   , start
+  , threadEnd
   )
 import Promises.Language
 import Support (Cancel (..), Ending, Failure (..), Fault (..), endingOf)

@@ -1,3 +1,4 @@
+{-# LANGUAGE CPP #-}
 {-# LANGUAGE RankNTypes #-}
 
 -- |
@@ -10,7 +11,9 @@
 module Behavior.Internal.Runtime
   ( -- * Threads
     Label (..)
-  , Thread (..)
+  , Thread (threadId)
+  , threadEnd
+  , threadEnded
   , start
   , interrupt
   , interruptByMessenger
@@ -35,9 +38,8 @@ module Behavior.Internal.Runtime
   , reportingTo
   ) where
 
-import Control.Concurrent (ThreadId, forkIO, myThreadId, threadDelay, throwTo)
-import Control.Concurrent.Async (asyncThreadId, asyncWithUnmask, waitCatchSTM)
-import Control.Concurrent.STM (STM)
+import Control.Concurrent (ThreadId, forkIO, forkIOWithUnmask, myThreadId, threadDelay, throwTo)
+import Control.Concurrent.STM (STM, TVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
   ( BlockedIndefinitelyOnSTM (..)
@@ -49,53 +51,75 @@ import Control.Exception
   , try
   , uninterruptibleMask_
   )
-import Control.Monad (join, when)
+import Control.Monad (when)
 import Data.Foldable (for_)
-import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
+import Data.IORef (IORef, newIORef, readIORef, writeIORef)
 import GHC.Clock (getMonotonicTime)
 import GHC.Conc (labelThread)
 import System.IO.Unsafe (unsafePerformIO)
 
+#if !MIN_VERSION_base(4,18,0)
+import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
+#endif
+
+import Behavior.Internal.Counter
 import Behavior.Internal.Seam
 
 -- | A thread that the library has started, and how it ends.
 data Thread a = Thread
   { threadId :: ThreadId
-  , threadEnd :: STM (Either SomeException a)
-  -- ^ Retries until the thread has ended, cleanup included.
+  , threadResult :: TVar (Maybe (Either SomeException a))
+  -- ^ Nothing until it has ended, cleanup included.
   }
+
+-- | Waits until the thread has ended.
+threadEnd :: Thread a -> STM (Either SomeException a)
+threadEnd thread = STM.readTVar (threadResult thread) >>= maybe STM.retry pure
+
+-- | How the thread has ended, if it has.
+threadEnded :: Thread a -> IO (Maybe (Either SomeException a))
+threadEnded = STM.readTVarIO . threadResult
 
 -- | Starts a thread in which the action runs unmasked, whatever the caller's
 -- masking state. Call it masked, or the thread may be lost before it is returned.
 start :: Label -> IO a -> IO (Thread a)
-start label act =
-  inSimulation really $ \simulation -> do
-    end <- STM.newEmptyTMVarIO
-    thread <- spawn simulation label (life label act) (STM.putTMVar end)
-    modifyLiving 1
-    pure Thread {threadId = thread, threadEnd = STM.readTMVar end}
- where
-  really = do
-    modifyLiving 1
-    -- Forked masked: an exception cannot strike before 'try' is in place, nor
-    -- between the end of the action and the publication of how it ended.
-    thread <- asyncWithUnmask (life label act (pure ()))
-    pure
-      Thread
-        { threadId = asyncThreadId thread
-        , threadEnd = join <$> waitCatchSTM thread
-        }
+start label act = do
+  result <- STM.newTVarIO Nothing
+  let publish = STM.writeTVar result . Just
+      -- Forked masked: an exception cannot strike before 'try' is in place, nor
+      -- between the end of the action and the publication of how it ended.
+      really = do
+        add livingCount 1
+        forkIOWithUnmask $ \unmask -> do
+          end <- life label act (pure ()) unmask
+          STM.atomically (publish end)
+      simulated simulation = spawn simulation label (life label act) publish <* add livingCount 1
+  thread <- inSimulation really simulated
+  pure (Thread thread result)
 
 -- | What a thread does, and how the action ended. It begins by what is given.
 life :: Label -> IO a -> IO () -> (forall b. IO b -> IO b) -> IO (Either SomeException a)
 life label act begin unmask = do
-  self <- myThreadId
-  labelThread self (show label)
+  when labelling $ myThreadId >>= \self -> labelThread self (show label)
   report (Started label)
   end <- try (unmask (begin >> act))
   report (Ended label)
-  modifyLiving (-1)
+  add livingCount (-1)
   pure end
+
+-- | Whether labels can be seen by anybody. Before GHC 9.6 only an event log shows them,
+-- and to label a thread costs more than to start it.
+labelling :: Bool
+#if MIN_VERSION_base(4,18,0)
+labelling = True
+#else
+labelling = unsafePerformIO (traced <$> getTraceFlags)
+ where
+  traced flags = case tracing flags of
+    TraceNone -> False
+    _ -> True
+{-# NOINLINE labelling #-}
+#endif
 
 -- | Throws an exception to a thread, and returns when that has heard it or has ended. A
 -- thread in an uninterruptible cleanup is slow to hear; whoever waits for it can be
@@ -115,14 +139,11 @@ interruptByMessenger thread e =
 
 -- | How many threads started by 'start' have not ended.
 living :: IO Int
-living = readIORef livingCount
+living = total livingCount
 
-livingCount :: IORef Int
-livingCount = unsafePerformIO (newIORef 0)
+livingCount :: Counter
+livingCount = unsafePerformIO newCounter
 {-# NOINLINE livingCount #-}
-
-modifyLiving :: Int -> IO ()
-modifyLiving change = atomicModifyIORef' livingCount (\n -> (n + change, ()))
 
 -- | Runs a transaction, waiting (without using the processor) while it retries.
 --
@@ -137,7 +158,9 @@ modifyLiving change = atomicModifyIORef' livingCount (\n -> (n + change, ()))
 --
 -- @since 0.1.0.0
 atomically :: STM a -> IO a
-atomically transaction = inSimulation (STM.atomically transaction) (`transact` transaction)
+atomically transaction = inSimulation (STM.atomically transaction) simulated
+ where
+  simulated simulation = transact simulation transaction
 
 -- | 'atomically' that nothing can interrupt; for the end of threads that were asked to
 -- stop. GHC's deadlock detector is not heeded: it takes a thread that waits for a

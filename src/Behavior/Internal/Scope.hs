@@ -18,7 +18,8 @@ module Behavior.Internal.Scope
   , structured
 
     -- * Branches
-  , Branch (outcome)
+  , Branch
+  , outcome
   , SomeBranch (..)
   , branch
   , worker
@@ -36,7 +37,7 @@ module Behavior.Internal.Scope
   ) where
 
 import Control.Concurrent (ThreadId)
-import Control.Concurrent.STM (STM, orElse, retry)
+import Control.Concurrent.STM (STM, retry)
 import Control.Exception
   ( Exception (..)
   , SomeException (..)
@@ -52,6 +53,7 @@ import Control.Exception
 import Control.Monad (filterM)
 import Data.Foldable (traverse_)
 import Data.IORef (IORef, atomicModifyIORef', modifyIORef', newIORef, readIORef, writeIORef)
+import Data.Maybe (isJust)
 
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime
@@ -62,13 +64,18 @@ newtype Scope = Scope (IORef [SomeBranch])
 
 -- | A behaviour that runs in a thread of its own on behalf of an operator.
 data Branch a = Branch
-  { branchThread :: ThreadId
+  { branchThread :: Thread a
   , branchAsked :: IORef Bool
   -- ^ Whether it was asked to stop: nobody is asked twice, for the second
   -- request would interrupt the cleanup that the first one began.
-  , outcome :: STM (Outcome a)
-  -- ^ How the branch ended; retries until it has.
   }
+
+-- | How the branch ended; retries until it has.
+outcome :: Branch a -> STM (Outcome a)
+outcome b = ending b <$> threadEnd (branchThread b)
+
+branchId :: Branch a -> ThreadId
+branchId = threadId . branchThread
 
 -- | A branch, whatever it returns.
 data SomeBranch = forall a. SomeBranch (Branch a)
@@ -108,8 +115,10 @@ end (Scope branches) = do
   started <- reverse <$> readIORef branches
   -- Nothing may interrupt this, or the rest would be orphaned.
   uninterruptibleMask_ (ask started)
-  concat <$> traverse (\(SomeBranch b) -> faults <$> atomicallyFirmly (outcome b)) started
+  concat <$> traverse (\(SomeBranch b) -> faults <$> ended b) started
  where
+  -- Most have ended by now, and then no transaction is needed.
+  ended b = threadEnded (branchThread b) >>= maybe (atomicallyFirmly (outcome b)) (pure . ending b)
   faults = \case
     Faulted e -> [e]
     _ -> []
@@ -124,12 +133,7 @@ worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
 worker (Scope branches) label act = mask_ $ do
   asked <- newIORef False
   thread <- start label (act (readIORef asked))
-  let new =
-        Branch
-          { branchThread = threadId thread
-          , branchAsked = asked
-          , outcome = either (ending (threadId thread)) Completed <$> threadEnd thread
-          }
+  let new = Branch {branchThread = thread, branchAsked = asked}
   modifyIORef' branches (SomeBranch new :)
   pure new
 
@@ -141,7 +145,7 @@ forget (Scope branches) old = modifyIORef' branches without
   -- Strict: an unevaluated list would hold on to what was taken out of it.
   without [] = []
   without (SomeBranch b : others)
-    | branchThread b == branchThread old = others
+    | branchId b == branchId old = others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
 -- | Asks branches to stop, all at once: none hears it later because another cannot
@@ -153,7 +157,7 @@ ask :: [SomeBranch] -> IO ()
 ask branches = mask_ (filterM marked branches >>= go)
  where
   go [] = pure ()
-  go [SomeBranch b] = interrupt (branchThread b) (stopping b) `onException` writeIORef (branchAsked b) False
+  go [SomeBranch b] = interrupt (branchId b) (stopping b) `onException` writeIORef (branchAsked b) False
   go (b : bs) = askByMessenger b >> go bs
 
 -- | Asks branches to stop, all at once, and does not wait for any to hear it.
@@ -161,15 +165,15 @@ askWithoutWaiting :: [SomeBranch] -> IO ()
 askWithoutWaiting branches = mask_ (filterM marked branches >>= traverse_ askByMessenger)
 
 askByMessenger :: SomeBranch -> IO ()
-askByMessenger (SomeBranch b) = interruptByMessenger (branchThread b) (stopping b)
+askByMessenger (SomeBranch b) = interruptByMessenger (branchId b) (stopping b)
 
 stopping :: Branch a -> Stop
-stopping = Stop . branchThread
+stopping = Stop . branchId
 
 -- | Marks a branch as asked. False if it was asked before, or has ended.
 marked :: SomeBranch -> IO Bool
 marked (SomeBranch b) = do
-  ended <- atomically ((True <$ outcome b) `orElse` pure False)
+  ended <- isJust <$> threadEnded (branchThread b)
   if ended then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
 
 -- | Waits until the branch has completed.
@@ -192,15 +196,17 @@ result = \case
   Faulted e -> Left e
   Stopped e -> Left e
 
--- | How a thread ended that ended with an exception.
-ending :: ThreadId -> SomeException -> Outcome a
-ending self e
-  | isOwnStop e = Stopped e
-  | Just (StoppedWithFault cause fault) <- fromException e, isOwnStop cause = Faulted fault
-  | isFailure e = Failing e
-  | otherwise = Faulted e
+-- | How a branch ended whose thread ended so.
+ending :: Branch a -> Either SomeException a -> Outcome a
+ending b = \case
+  Right a -> Completed a
+  Left e
+    | isOwnStop e -> Stopped e
+    | Just (StoppedWithFault cause fault) <- fromException e, isOwnStop cause -> Faulted fault
+    | isFailure e -> Failing e
+    | otherwise -> Faulted e
  where
-  isOwnStop cause = fromException cause == Just (Stop self)
+  isOwnStop cause = fromException cause == Just (stopping b)
 
 -- | How an operator asks a branch to stop. It names the thread it is meant for: a
 -- request that strays into another thread is not mistaken for that one's own.

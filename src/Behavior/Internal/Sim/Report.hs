@@ -59,7 +59,7 @@ instead = \case
 --
 -- @since 0.1.0.0
 narrate :: [Step] -> String
-narrate made = unlines (map (line . head) (groupBy repeated made))
+narrate made = unlines (concatMap (map line . take 1) (groupBy repeated made))
  where
   repeated s t = (at s, number s, did s) == (at t, number t, did t)
   line s =
