@@ -63,7 +63,7 @@
 --   real time.) To print is fine, as long as somebody reads.
 -- * Clocks, random numbers and finalizers of your own are as they are.
 --
--- A loop that never allocates can be stopped by nobody. It ends the process after
+-- A loop that never allocates can be stopped by nobody. The process is killed after
 -- 'patience' and five seconds, if there is a second capability to notice it (@+RTS -N2@); or
 -- compile it with @-fno-omit-yields@, and the run ends with 'TooSlow'.
 --

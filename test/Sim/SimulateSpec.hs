@@ -22,6 +22,7 @@ import Behavior.Parallel (fork, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Time (atomically, checkpoint, now, timeout)
+import Sim.Busy (busy)
 import Support hiding (note)
 
 spec :: Spec
@@ -176,6 +177,9 @@ mistakes = do
     explain (outcome run) `shouldContain` "something outside of the simulation changed what these waited for"
   it "a computation without end" $ do
     run <- simulateWith defaults {patience = 0.1} (mapM_ (evaluate . length . show) [0 :: Int ..])
+    explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
+  it "a loop that never allocates, if it is compiled so that it can be interrupted" $ do
+    run <- simulateWith defaults {patience = 0.1} (busy 0)
     explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
   it "a simulation inside of a simulation" $ do
     run <- simulate (finished <$> simulate (pure ()))

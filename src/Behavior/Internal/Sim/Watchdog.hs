@@ -20,6 +20,7 @@ import System.IO.Unsafe (unsafePerformIO)
 #if !defined(mingw32_HOST_OS)
 import System.IO (hFlush, hPutStrLn, stderr)
 import System.Posix.Signals (raiseSignal, sigKILL)
+import System.Posix.Unistd (usleep)
 #endif
 
 import Behavior.Internal.Seam (Seconds (..))
@@ -60,7 +61,7 @@ data Sight = Sight
 -- | Looks every few milliseconds, for as long as there is something to look after.
 patrol :: Map Int Sight -> Int -> IO ()
 patrol seen idle = do
-  threadDelay 5000
+  doze
   (sims, _) <- readIORef kennel
   if Map.null sims && idle > 20
     then do
@@ -69,6 +70,16 @@ patrol seen idle = do
     else do
       sights <- Map.traverseWithKey (\n sim -> look sim (Map.lookup n seen)) sims
       patrol sights (if Map.null sims then idle + 1 else 0)
+
+-- | Sleeps for five milliseconds. With the threaded runtime in the operating system:
+-- 'threadDelay' needs a thread of the runtime's own, which may never get its turn while
+-- somebody keeps its capability busy.
+doze :: IO ()
+#if defined(mingw32_HOST_OS)
+doze = threadDelay 5000
+#else
+doze = if rtsSupportsBoundThreads then usleep 5000 else threadDelay 5000
+#endif
 
 look :: Sim -> Maybe Sight -> IO Sight
 look sim before = do

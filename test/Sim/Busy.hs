@@ -1,0 +1,11 @@
+{-# OPTIONS_GHC -fno-omit-yields #-}
+
+-- |
+-- A loop that never allocates, compiled so that it can be interrupted all the same.
+module Sim.Busy (busy) where
+
+-- | Counts for ever.
+busy :: Int -> IO ()
+busy n
+  | n < 0 = pure ()
+  | otherwise = busy (if n == maxBound then 0 else n + 1)
