@@ -19,9 +19,11 @@ import Test.QuickCheck
 
 import Behavior.Sim (Schedule (..))
 import Semantics.Generate
+import Semantics.Parts (depth)
 import Semantics.Path
 import Semantics.Program
 import Semantics.Run
+import Semantics.Shrink
 
 spec :: Spec
 spec = do
@@ -77,9 +79,36 @@ subtle =
     alone (Scoped (Fork (act 1 "a" Faults StopsAtOnce) `Then` act 1 "b" Faults StopsAtOnce))
   , -- Two are forked at once, and fail at once.
     alone (Scoped (Both (Fork (act 1 "a" Fails StopsAtOnce)) (Fork (act 1 "b" Fails StopsAtOnce)) `Then` WaitUntil (Watched "p")))
+  , -- What is shared has died, and its body looks before it hears that it should stop.
+    (alone (WithShared (Polled 1 (act 9 "s" Fails (EndsAfter 0 Fails))) (deaf 2 "a" `Then` (WaitUntil Shared `Else` act 1 "b" Fails StopsAtOnce))))
+      { patience = 1
+      }
+  , -- It was high, unnoticed by the operator.
+    (alone (RSelect (And (Hysteresis 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
+      { changes = [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "q" (At 1)]
+      }
+  , -- A change has lasted just as it is taken back.
+    (alone (WhileHolding (Debounce 1 (Watched "p")) (act 4 "a" Fails StopsAtOnce)))
+      { conditions = [("p", At 1)]
+      , changes = [Change 1 "p" (At 0), Change 2 "p" (At 1)]
+      }
+  , -- A reading ends just as it is overdue.
+    alone (WaitUntil (StaleAfter 2 (Polled 3 (act 2 "s" (Succeeds 1) StopsAtOnce))))
+  , -- The answer is there just as time is up.
+    alone (Timeout 2 (Scoped (Await (act 2 "a" (Succeeds 1) StopsAtOnce) (act 1 "b" (Succeeds 2) StopsAtOnce))))
+  , -- It completes although asked to stop, and is asked again.
+    (alone (Parallel (deaf 3 "a") (act 9 "b" Fails (EndsAfter 1 Faults)) `Else` act 9 "c" Fails StopsAtOnce))
+      { patience = 1
+      , caller = Stranger 1
+      }
+  , (alone (deaf 2 "a" `Then` (act 9 "b" Fails (EndsAfter 0 (Succeeds 1)) `Then` act 1 "c" Fails StopsAtOnce)))
+      { patience = 1
+      , caller = Stranger 0
+      }
   ]
  where
-  alone = World [("p", At 0)] [] 9
+  alone p = World [("p", At 0), ("q", At 0)] [] 9 p Operator
+  deaf n name = Do name [Script n (Succeeds 0) Uninterruptible StopsAtOnce]
   act n name how asked = Do name [Script n how Unmasked asked]
 
 data Judgement
@@ -179,6 +208,9 @@ relation = do
     it "stops what was forked when the body ends, and all when that fails" $ do
       Scoped (Fork (stoppedBy (StopsAfter 2) "a") `Then` act "b" 1 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
       Scoped (Fork (act "a" 1 Fails) `Then` stoppedBy (StopsAfter 2) "b") `endsIn` [Gave 3 (Failed "a")]
+    it "waits for the result of what was forked, which never comes of a failure" $ do
+      Scoped (Await (act "a" 3 (Succeeds 7)) (act "b" 1 (Succeeds 1))) `endsIn` [Gave 3 (Succeeded (Number 7))]
+      Scoped (Await (act "a" 3 Fails) (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 1)) `endsIn` [Gave 3 (Failed "a")]
 
   describe "Being asked to stop" $ do
     it "keeps the result of what completed although it was asked to stop" $
@@ -191,6 +223,19 @@ relation = do
     it "waits for what hears nothing" $
       Timeout 1 (Do "a" [(script 4 (Succeeds 7)) {masking = Uninterruptible}] `Then` act "b" 1 (Succeeds 0))
         `endsIn` [Gave 4 (Failed (timedOut 1))]
+
+    it "throws the fault of a cleanup together with a stranger's cancellation" $ do
+      (with [] (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))) {patience = 2, caller = Stranger 1}
+        `endsWith` [Gave 5 (Stopped (Just (cleanupOf "b")))]
+    it "can be asked again by a stranger, but not in a cleanup" $ do
+      (with [] (stoppedBy (EndsAfter 0 (Succeeds 7)) "a" `Then` stoppedBy StopsAtOnce "b")) {patience = 2, caller = Stranger 1}
+        `endsWith` [Gave 3 (Stopped Nothing)]
+      (with [] (stoppedBy (EndsAfter 2 (Succeeds 7)) "a")) {patience = 2, caller = Stranger 1}
+        `endsWith` [Gave 4 (Succeeded (Number 7))]
+    it "can have its own cleanup cut short by a stranger, but not that of a branch" $ do
+      (with [] (stoppedBy (TidiesUp 5) "a")) {patience = 2, caller = Stranger 1} `endsWith` [Gave 3 (Stopped Nothing)]
+      (with [] (Timeout 50 (stoppedBy (TidiesUp 5) "a"))) {patience = 2, caller = Stranger 1}
+        `endsWith` [Gave 7 (Stopped Nothing)]
 
   describe "Conditions that change" $ do
     it "latches what a monitor has seen" $
@@ -229,12 +274,35 @@ relation = do
         (Do "l" [(script 9 (Succeeds 1)) {whenAsked = StopsAfter 2}, script 1 (Succeeds 2)])
         (act "r" 9 (Succeeds 3))
         `endsIn` [Gave 8 (Succeeded (Number 2))]
+
+  describe "Signals made of others" $ do
+    it "can need several to hold" $
+      with [Change 1 "p" (At 1), Change 2 "q" (At 1)] (WaitUntil (And (Watched "p") (Watched "q")))
+        `endsWith` [Gave 2 (Succeeded Unit)]
+    it "remember that they were high" $
+      with
+        [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "p" (At 0)]
+        (WithShared (Hysteresis 0 2 (Watched "p")) (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7))))
+        `endsWith` [Gave 3 (Failed doesNotHold)]
+    it "do not follow a flicker" $
+      with [Change 1 "p" (At 1), Change 2 "p" (At 0), Change 3 "p" (At 1)] (WaitUntil (Debounce 2 (Watched "p")))
+        `endsWith` [Gave 5 (Succeeded Unit)]
+    it "fail while a reading takes too long, and the operator waits for that" $
+      WaitUntil (StaleAfter 2 (Polled 1 (stoppedBy (StopsAfter 3) "s"))) `endsIn` [Gave 5 (Failed (overdueBy 2))]
+    it "are read once for all who share them" $
+      WithShared
+        (Polled 2 (Do "s" [script 0 (Succeeds 0), script 0 (Succeeds 0), script 0 (Succeeds 1)]))
+        (Both (WaitUntil Shared) (act "b" 1 (Succeeds 0) `Then` WaitUntil Shared))
+        `endsIn` [Gave 4 (Succeeded Unit)]
+    it "stop together with those who share them, whose fault comes first" $
+      Timeout 1 (WithShared (Polled 1 (stoppedBy (EndsAfter 0 Faults) "s")) (stoppedBy (EndsAfter 2 Faults) "b"))
+        `endsIn` [Gave 3 (Faulted (cleanupOf "b"))]
  where
   act name n how = Do name [script n how]
   script n how = Script n how Unmasked StopsAtOnce
   -- Takes longer than anything else.
   stoppedBy response name = Do name [(script 50 (Succeeds 0)) {whenAsked = response}]
-  with changes' p = World {conditions = [("p", At 0)], changes = changes', patience = 100, program = p}
+  with changes' p = World {conditions = [("p", At 0), ("q", At 0)], changes = changes', patience = 100, program = p, caller = Operator}
   endsIn p = endsWith (with [] p)
   endsWith world ends' = fmap (Set.map end) (paths 10000 whatIsDone world) `shouldBe` Just (Set.fromList ends')
   does world events = fmap (Set.map timeline) (paths 10000 whatIsDone world) `shouldBe` Just (Set.singleton events)

@@ -13,7 +13,7 @@ import System.Mem (performMajorGC)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), atomicallyFirmly, reportingTo)
+import Behavior.Internal.Runtime (Event (..), atomically, firmly, reportingTo)
 import Places
 import Support
 
@@ -140,7 +140,7 @@ cancelled = do
       pass inside
       throwTo (asyncThreadId caller) theCancel
       -- This thread is deadlocked as well.
-      end <- endingOf <$> atomicallyFirmly (waitCatchSTM caller)
+      end <- endingOf <$> firmly (atomically (waitCatchSTM caller))
       open recovered
       end `shouldBe` isCancelled
       notes notebook `shouldReturn` ["recovered"]

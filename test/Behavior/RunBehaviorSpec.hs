@@ -18,7 +18,7 @@ import System.Posix.Signals
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), atomicallyFirmly, reportingTo)
+import Behavior.Internal.Runtime (Event (..), Label (..), atomically, firmly, reportingTo)
 import Support
 
 spec :: Spec
@@ -98,7 +98,7 @@ spec = guarded . describe "runBehavior" $ do
     let deadlock = open inside >> newEmptyMVar >>= takeMVar :: IO ()
     _ <- forkIO $ pass inside >> untilOpen found (performMajorGC >> yield)
     launching (runBehavior deadlock) $ \caller -> do
-      end <- endingOf <$> atomicallyFirmly (waitCatchSTM caller)
+      end <- endingOf <$> firmly (atomically (waitCatchSTM caller))
       open found
       end `shouldBe` FaultedWith (show BlockedIndefinitelyOnMVar)
  where

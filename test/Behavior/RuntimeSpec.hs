@@ -160,7 +160,7 @@ waiting = do
 
   it "firmly cannot" $ do
     var <- newTVarIO False
-    launching (atomicallyFirmly (readTVar var >>= \there -> if there then pure 'a' else retry)) $ \caller -> do
+    launching (firmly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $ \caller -> do
       awaitIdle (asyncThreadId caller)
       throwing (asyncThreadId caller) (Cancel "caller")
       stillRunning caller

@@ -118,7 +118,7 @@ end (Scope flaw _ branches) = do
  where
   onInterruption act after = try act >>= either (\(_ :: SomeException) -> after) pure
   wait (SomeBranch b) = atomically (fault <$> outcomeOf b)
-  waitFirmly (SomeBranch b) = atomicallyFirmly (fault <$> outcomeOf b)
+  waitFirmly (SomeBranch b) = firmly (atomically (fault <$> outcomeOf b))
   fault = \case
     Faulted e -> [e]
     _ -> []

@@ -7,20 +7,19 @@
 module Semantics.Generate
   ( worlds
   , smallWorlds
-  , shrinkWorld
-  , depth
   ) where
 
 import Data.List (sortOn)
 import Test.QuickCheck
 
+import Semantics.Parts
 import Semantics.Program
 
 -- | Worlds with programs that nest up to so many operators deep.
 worlds :: Int -> Gen World
 worlds deep = do
   levels' <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure Lost)]) known
-  World levels' <$> someChanges <*> choose (4, 16) <*> (renamed <$> programs deep)
+  World levels' <$> someChanges <*> choose (4, 16) <*> (renamed <$> programs deep) <*> callers
  where
   someChanges = do
     n <- choose (0, 8)
@@ -33,9 +32,12 @@ smallWorlds = do
   first <- At <$> choose (0, 1)
   n <- choose (0, 2)
   changes' <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
-  World [("p", first), ("q", At 0)] changes' <$> choose (2, 4) <*> (renamed <$> programs 1)
+  World [("p", first), ("q", At 0)] changes' <$> choose (2, 4) <*> (renamed <$> programs 1) <*> callers
  where
   someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure Lost)]
+
+callers :: Gen Caller
+callers = frequency [(3, pure Operator), (1, Stranger <$> choose (0, 3))]
 
 inOrder :: [Change] -> [Change]
 inOrder = sortOn (\(Change at _ _) -> at)
@@ -45,10 +47,11 @@ known = ["p", "q"]
 
 -- | Programs that nest up to so many operators deep, outside of any scope.
 programs :: Int -> Gen Program
-programs = within' False
+programs = within' False False
 
-within' :: Bool -> Int -> Gen Program
-within' inScope = go
+-- | Those that may fork, and those that may follow what is shared.
+within' :: Bool -> Bool -> Int -> Gen Program
+within' inScope sharing = go
  where
   go :: Int -> Gen Program
   go 0 =
@@ -57,7 +60,7 @@ within' inScope = go
       , (1, Pure . Number <$> choose (0, 2))
       , (1, WaitUntil <$> signal 0)
       ]
-        ++ [(8, Fork <$> action) | inScope]
+        ++ (if inScope then [(8, Fork <$> action), (4, Await <$> action <*> action)] else [])
   go n =
     frequency $
       [ (1, go 0)
@@ -76,9 +79,10 @@ within' inScope = go
       , (1, WaitUntil <$> sensed)
       , (2, WhileHolding <$> sensed <*> less)
       , (2, Timeout <$> frequency [(1, pure 0), (9, choose (1, 6))] <*> less)
-      , (2, Scoped <$> within' True (n - 1))
+      , (2, Scoped <$> within' True sharing (n - 1))
+      , (2, WithShared <$> sensed <*> within' False True (n - 1))
       ]
-        ++ [(3, Fork <$> less) | inScope]
+        ++ (if inScope then [(3, Fork <$> less), (3, Await <$> less <*> less)] else [])
    where
     less = frequency [(1, choose (0, n - 1)), (2, pure (n - 1))] >>= go
     sensed = signal (n - 1)
@@ -86,9 +90,20 @@ within' inScope = go
     few1 one = choose (1, 3) >>= \k -> vectorOf k one
   signal n =
     frequency
-      [ (4, Watched <$> elements known)
-      , (1, Polled <$> choose (1, 3) <*> (choose (0, min 1 n) >>= go))
+      [ (5, sensor n)
+      , (1, And <$> signal 0 <*> sensor n)
+      , (1, hysteresis <*> sensor n)
+      , (1, Debounce <$> choose (0, 3) <*> sensor n)
+      , (1, StaleAfter <$> choose (1, 3) <*> sensor n)
       ]
+  hysteresis = elements [Hysteresis low high | (low, high) <- [(0, 2), (0, 2), (0, 1), (1, 1), (1, 2)]]
+  sensor n =
+    frequency $
+      [ (8, Watched <$> elements known)
+      , (2, Polled <$> choose (1, 3) <*> (choose (0, min 1 n) >>= go))
+      ]
+        ++ [(6, pure Shared) | sharing]
+        ++ [(2, signal 0)]
   -- One that takes no time, while the condition holds, would go on for ever.
   takingTime later = Then <$> (Do "a" . pure . (\s -> s {takes = max 1 (takes s)}) <$> script) <*> later
 
@@ -103,7 +118,8 @@ script =
     <*> frequency [(6, pure Unmasked), (1, pure Masked), (1, pure Uninterruptible)]
     <*> frequency
       [ (4, pure StopsAtOnce)
-      , (3, StopsAfter <$> choose (0, 3))
+      , (2, StopsAfter <$> choose (0, 3))
+      , (2, TidiesUp <$> choose (0, 3))
       , (2, EndsAfter <$> choose (0, 2) <*> (Succeeds <$> choose (0, 2)))
       , (1, EndsAfter <$> choose (0, 2) <*> pure Fails)
       , (1, EndsAfter <$> choose (0, 2) <*> pure Faults)
@@ -121,110 +137,3 @@ named p names = case p of
   go = \case
     [] -> ([], names)
     qs -> foldl (\(done, ns) q -> let (q', ns') = named q ns in (done ++ [q'], ns')) ([], names) qs
-
--- | The programs of which a program is made, those of its signals first.
-parts :: Program -> [Program]
-parts = \case
-  Do _ _ -> []
-  Pure _ -> []
-  Then a b -> [a, b]
-  Else a b -> [a, b]
-  Attempt _ a -> [a]
-  FallbackOver as -> as
-  Parallel a b -> [a, b]
-  Both a b -> [a, b]
-  FirstOf as -> as
-  AllOf as -> as
-  RSelect s a b -> ofSignal s ++ [a, b]
-  Monitor s a b -> ofSignal s ++ [a, b]
-  Switch s as -> ofSignal s ++ as
-  TeleoReactive rules -> concat [ofSignal s ++ [a] | (s, a) <- rules]
-  WaitUntil s -> ofSignal s
-  WhileHolding s a -> ofSignal s ++ [a]
-  Timeout _ a -> [a]
-  Scoped a -> [a]
-  Fork a -> [a]
-
-ofSignal :: Signal -> [Program]
-ofSignal = \case
-  Watched _ -> []
-  Polled _ a -> [a]
-
--- | The program made of other parts, as many as it has.
-rebuild :: Program -> [Program] -> Program
-rebuild p new = case (p, new) of
-  (Then _ _, [a, b]) -> Then a b
-  (Else _ _, [a, b]) -> Else a b
-  (Attempt n _, [a]) -> Attempt n a
-  (FallbackOver _, as) -> FallbackOver as
-  (Parallel _ _, [a, b]) -> Parallel a b
-  (Both _ _, [a, b]) -> Both a b
-  (FirstOf _, as) -> FirstOf as
-  (AllOf _, as) -> AllOf as
-  (RSelect s _ _, as) | (s', [a, b]) <- sensing s as -> RSelect s' a b
-  (Monitor s _ _, as) | (s', [a, b]) <- sensing s as -> Monitor s' a b
-  (Switch s _, as) | (s', bs) <- sensing s as -> Switch s' bs
-  (TeleoReactive rules, as) -> TeleoReactive (ruled rules as)
-  (WaitUntil s, as) -> WaitUntil (fst (sensing s as))
-  (WhileHolding s _, as) | (s', [a]) <- sensing s as -> WhileHolding s' a
-  (Timeout n _, [a]) -> Timeout n a
-  (Scoped _, [a]) -> Scoped a
-  (Fork _, [a]) -> Fork a
-  _ -> p
- where
-  sensing (Polled n _) (a : as) = (Polled n a, as)
-  sensing s as = (s, as)
-  ruled ((s, _) : rules) as | (s', a : as') <- sensing s as = (s', a) : ruled rules as'
-  ruled _ _ = []
-
--- | How deep a program nests.
-depth :: Program -> Int
-depth p = maximum (0 : map ((+ 1) . depth) (parts p))
-
--- | Smaller worlds of the same kind.
-shrinkWorld :: World -> [World]
-shrinkWorld world =
-  [world {program = p} | p <- shrinkProgram (program world), not (stray p)]
-    ++ [world {changes = some} | some <- shrinkList shrinkChange (changes world)]
-    ++ [world {patience = n} | n <- shrink (patience world), n > 0]
- where
-  shrinkChange (Change at condition level) =
-    [Change at condition (At 0) | level `notElem` [At 0, At 1]] ++ [Change at' condition level | at' <- earlier at]
-  earlier at = [at - 1 | at > 0, all (\(Change other _ _) -> other <= at - 1 || other >= at) (changes world)]
-  -- A fork outside of every scope is no program.
-  stray = \case
-    Fork _ -> True
-    Scoped _ -> False
-    p -> any stray (parts p)
-
-shrinkProgram :: Program -> [Program]
-shrinkProgram p = parts p ++ outer ++ inner
- where
-  inner =
-    [ rebuild p (take n ps ++ [q'] ++ drop (n + 1) ps)
-    | let ps = parts p
-    , (n, q) <- zip [0 ..] ps
-    , q' <- shrinkPart q
-    ]
-  -- What keeps a recovery from going on for ever stays.
-  shrinkPart q = case (p, q) of
-    (Monitor {}, Then first second) -> Then first <$> shrinkProgram second
-    _ -> shrinkProgram q
-  outer = case p of
-    Do name scripts -> [Do name some | some <- shrinkList simpler scripts, not (null some)]
-    Pure Unit -> []
-    Pure _ -> [Pure Unit]
-    FallbackOver as -> FallbackOver <$> without as
-    FirstOf as -> FirstOf <$> without as
-    AllOf as -> AllOf <$> without as
-    TeleoReactive rules -> TeleoReactive <$> without rules
-    Attempt n a -> [Attempt (n - 1) a | n > 1]
-    RSelect (Polled _ _) a b -> [RSelect (Watched "p") a b]
-    WhileHolding (Polled _ _) a -> [WhileHolding (Watched "p") a]
-    _ -> []
-  without xs = [take n xs ++ drop (n + 1) xs | n <- [0 .. length xs - 1]]
-  simpler s =
-    [s {masking = Unmasked} | masking s /= Unmasked]
-      ++ [s {whenAsked = StopsAtOnce} | whenAsked s /= StopsAtOnce]
-      ++ [s {ends = Succeeds 0} | ends s /= Succeeds 0]
-      ++ [s {takes = takes s - 1} | takes s > 1]

@@ -23,8 +23,9 @@ import Data.Maybe (mapMaybe)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
+import Semantics.Begin (initial)
 import Semantics.Program
-import Semantics.State (Now (clock), Running (Over), State (..), initial)
+import Semantics.State (Now (clock), Running (Over), State (..))
 import Semantics.Step
 
 -- | What could be seen of a run, and how it ended.

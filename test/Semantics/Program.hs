@@ -25,6 +25,7 @@ module Semantics.Program
     -- * Programs and the world that they act in
   , World (..)
   , Change (..)
+  , Caller (..)
 
     -- * What comes of them
   , Result (..)
@@ -38,6 +39,7 @@ module Semantics.Program
   , noValue
   , doesNotHold
   , timedOut
+  , overdueBy
   , cleanupOf
   , timeIsUp
   ) where
@@ -71,9 +73,13 @@ data Program
   | WaitUntil Signal
   | WhileHolding Signal Program
   | Timeout Ticks Program
+  | -- | The program may follow the signal as 'Shared'.
+    WithShared Signal Program
   | Scoped Program
   | -- | Forks into the nearest 'Scoped' around it.
     Fork Program
+  | -- | Forks the first, runs the second, and waits for the result of the first.
+    Await Program Program
   deriving (Eq, Ord, Show)
 
 -- | A signal carries a number; as a condition it 'holds' or not.
@@ -81,6 +87,14 @@ data Signal
   = Watched Condition
   | -- | What the program returns is the reading.
     Polled Ticks Program
+  | -- | One where both hold, otherwise zero.
+    And Signal Signal
+  | -- | One where it is high, otherwise zero. The lower threshold comes first.
+    Hysteresis Int Int Signal
+  | Debounce Ticks Signal
+  | StaleAfter Ticks Signal
+  | -- | The signal of the nearest 'WithShared' around it.
+    Shared
   deriving (Eq, Ord, Show)
 
 -- | One call of an action.
@@ -112,6 +126,8 @@ data Response
   = StopsAtOnce
   | -- | Stops after a cleanup of so many ticks.
     StopsAfter Ticks
+  | -- | Likewise, unless it is asked again: that ends the cleanup.
+    TidiesUp Ticks
   | -- | Ends after so many ticks in a way of its own: it completes although asked
     -- to stop, or its cleanup goes wrong.
     EndsAfter Ticks Ending
@@ -135,15 +151,24 @@ data Level
 
 -- | A program, the conditions as they are at first, how they change, and when the
 -- caller loses patience and the program is asked to stop.
---
--- > firstOf [program, the environment, which makes the changes]
 data World = World
   { conditions :: [(Condition, Level)]
   , changes :: [Change]
   -- ^ In the order of their times.
   , patience :: Ticks
   , program :: Program
+  , caller :: Caller
   }
+  deriving (Eq, Ord, Show)
+
+-- | Who asks the program to stop.
+data Caller
+  = -- | An operator.
+    --
+    -- > firstOf [program, the environment, which makes the changes]
+    Operator
+  | -- | Somebody who knows nothing of operators, and after so many ticks asks again.
+    Stranger Ticks
   deriving (Eq, Ord, Show)
 
 -- | When a condition changes, and to what.
@@ -206,6 +231,9 @@ doesNotHold = "FailedBecause \"the condition does not hold\""
 
 timedOut :: Ticks -> String
 timedOut n = "TimedOut " ++ show n ++ ".0"
+
+overdueBy :: Ticks -> String
+overdueBy n = "FailedBecause \"no reading of the signal within " ++ show n ++ ".0 s\""
 
 -- | The name under which the cleanup of an action fails or faults.
 cleanupOf :: Name -> String

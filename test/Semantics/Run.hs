@@ -12,7 +12,11 @@ import Control.Exception
   ( ErrorCall (..)
   , Exception (..)
   , SomeException
+  , asyncExceptionFromException
+  , asyncExceptionToException
   , mask
+  , mask_
+  , onException
   , throwIO
   , try
   , uninterruptibleMask_
@@ -26,12 +30,14 @@ import Data.Set (Set)
 import qualified Data.Set as Set
 
 import Behavior.Internal.Failure hiding (Failed (..))
+import Behavior.Internal.Filter
 import Behavior.Internal.Parallel
 import Behavior.Internal.Reactive
 import Behavior.Internal.Runtime hiding (Event (..), Label)
 import Behavior.Internal.Sensor
 import Behavior.Internal.Scope (StoppedWithFault (..))
-import Behavior.Internal.Source (watching)
+import Behavior.Internal.Source (watching, withShared)
+import qualified Behavior.Internal.Source as Library
 import Behavior.Internal.Time
 import Behavior.Sim
   ( Did (Says)
@@ -101,22 +107,33 @@ observing simulated world = do
     (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others events
     _ -> recorded others events
   recorded [] _ = []
-  isBranch (Label _ name) = name `notElem` ["", "polling", "clock"]
+  isBranch (Label _ name) = name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "hysteresis"]
 
 -- | Where a program acts: what the conditions are at, how often actions were called,
--- and where to fork.
+-- where to fork, and what is shared.
 data Stage = Stage
   { levels :: Map Condition (TVar Level)
   , calls :: IORef (Map Name Int)
-  , forking :: Behavior Value -> Behavior ()
+  , forking :: Behavior Value -> Behavior (STM Value)
+  , nearest :: Library.Signal Int
   }
 
 -- | The world's program and environment. What can be seen is told to the given
 -- action, which must not be a scheduling point.
 behavior :: (Event -> IO ()) -> World -> Behavior Value
 behavior tell world = do
-  stage <- Stage <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure noNursery
-  firstOf [play tell stage (program world), environment stage]
+  stage <- Stage <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure noNursery <*> pure (pure 0)
+  let played = play tell stage (program world)
+  case caller world of
+    Operator -> firstOf [played, timeIsUp <$ environment stage]
+    Stranger later -> do
+      thread <- mask_ (start (Sim.Label "stranger" "") played)
+      let interrupting = interruptByMessenger (threadId thread) Enough
+      environment stage
+      interrupting
+      sleepUntil (fromIntegral (patience world + later))
+      interrupting
+      atomically (threadEnd thread) >>= either throwIO pure
  where
   environment stage = do
     for_ (changes world) $ \(Change when condition level) -> do
@@ -124,7 +141,6 @@ behavior tell world = do
       for_ (Map.lookup condition (levels stage)) $ \var -> atomically (writeTVar var level)
       tell (condition `Becomes` level)
     sleepUntil (fromIntegral (patience world))
-    pure timeIsUp
   noNursery _ = throwIO (ErrorCall "a fork outside every scope")
 
 play :: (Event -> IO ()) -> Stage -> Program -> Behavior Value
@@ -153,11 +169,18 @@ play tell stage = go
     WaitUntil signal -> Unit <$ waitUntil (holds <$> level signal)
     WhileHolding signal p -> whileHolding (holds <$> level signal) (go p)
     Timeout limit p -> timeout (fromIntegral limit) (go p)
-    Scoped body -> scoped (\nursery -> play tell stage {forking = void . fork nursery} body)
+    WithShared signal p -> withShared (level signal) (\s -> play tell stage {nearest = s} p)
+    Scoped body -> scoped (\nursery -> play tell stage {forking = fork nursery} body)
     Fork p -> Unit <$ forking stage (go p)
+    Await p q -> forking stage (go p) >>= \result -> go q >> atomically result
   level = \case
     Watched condition -> watching (reading condition)
     Polled every p -> number <$> polling (fromIntegral every) (go p)
+    And a b -> (\m n -> fromEnum (holds m && holds n)) <$> level a <*> level b
+    Hysteresis low high signal -> fromEnum <$> hysteresis low high (level signal)
+    Debounce n signal -> debounce (fromIntegral n) (level signal)
+    StaleAfter n signal -> staleAfter (fromIntegral n) (level signal)
+    Shared -> nearest stage
   reading :: Condition -> STM Int
   reading condition = case Map.lookup condition (levels stage) of
     Nothing -> retry
@@ -182,6 +205,7 @@ act tell name script = do
             case whenAsked script of
               StopsAtOnce -> throwIO e
               StopsAfter n -> clean n >> tell Stops >> throwIO e
+              TidiesUp n -> (wait n `onException` tell Hears) >> tell Stops >> throwIO e
               EndsAfter n how -> clean n >> finish (cleanupOf name) how
  where
   inState restore = case masking script of
@@ -215,6 +239,14 @@ instance Show Failure where
 instance Exception Failure where
   toException = behaviorFailedToException
   fromException = behaviorFailedFromException
+
+-- | What a stranger throws.
+data Enough = Enough
+  deriving (Show)
+
+instance Exception Enough where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException
 
 newtype Fault = Fault Name
 

@@ -10,21 +10,15 @@ module Semantics.State
   , Operator (..)
   , Thread (..)
   , Life (..)
-  , Request (..)
   , Phase (..)
   , Moment (..)
   , Reaction (..)
-  , Sensor (..)
+
+    -- * What a signal is made of
+  , Source (..)
   , Poller (..)
   , Poll (..)
-
-    -- * Beginning
-  , initial
-  , begin
-  , andThen
-  , orElse
-  , ended
-  , thread
+  , module Semantics.Filter
 
     -- * Threads
   , ask
@@ -35,20 +29,14 @@ module Semantics.State
   , faultOf
   , threadsOf
 
-    -- * Sensors
-  , askSensor
-  , asAskedNow
-  , rested
-  , faulted
-
     -- * Time
   , moments
   ) where
 
 import Data.Map.Strict (Map)
-import qualified Data.Map.Strict as Map
-import Data.Maybe (isJust, mapMaybe)
+import Data.Maybe (isJust)
 
+import Semantics.Filter
 import Semantics.Program
 
 data State = State
@@ -63,6 +51,10 @@ data Now = Now
   , levels :: Map Condition Level
   , calls :: Map Name Int
   -- ^ How often an action was called; those to come all follow the last script.
+  , shared :: [Source]
+  -- ^ Those that are shared around the part which takes a step, the nearest first.
+  , answers :: Map Int (Maybe Value)
+  -- ^ The results for which somebody waits, or will.
   }
   deriving (Eq, Ord, Show)
 
@@ -70,6 +62,8 @@ data Now = Now
 data Running
   = -- | It has not begun.
     Starting Program
+  | -- | It is about to look at what is shared.
+    Opening Program
   | -- | It is about to call an action.
     Calling Name [Script]
   | -- | The action does what it does until that moment.
@@ -77,19 +71,31 @@ data Running
   | -- | It was asked to stop, and is busy with that until that moment. (Nothing: then it
     -- has stopped.)
     Cleaning Name Ticks (Maybe Ending)
+  | -- | Likewise, but it can hear another request.
+    Tidying Name Ticks
   | Running `AndThen` Program
   | Running `OrElse` Program
   | -- | The operator waits for its branches.
     Looking Operator [Thread]
   | -- | The operator follows its signal.
-    Reacting Program [Sensor] Phase
+    Reacting Program Source View Phase
+  | -- | The source is there for as long as the body runs.
+    Sharing Source Thread
   | -- | The operator has come to a verdict, and waits for those whom it has asked to stop.
-    Concluding Operator Result [Sensor] [Thread]
-  | Forking Program
+    Concluding Operator Result Source [Thread]
+  | -- | It is about to fork the one. If it then waits for the result, it runs the other
+    -- before.
+    Forking Program (Maybe Program)
   | -- | What it forks has started.
-    Forked
+    Forked (Maybe (Int, Program))
+  | -- | When this is over, it waits for that answer.
+    Obtaining Int Running
+  | -- | When this is over, it gives that answer.
+    Answering Int Running
   | -- | The environment, with the changes to come.
     Changing [Change] Ticks
+  | -- | The program of a stranger, who asks it to stop at those times.
+    Called Request Running [Change] [Ticks]
   | Over Result
   deriving (Eq, Ord, Show)
 
@@ -97,6 +103,7 @@ data Operator
   = Race
   | Gather
   | Nursery
+  | Share
   | React
   deriving (Eq, Ord, Show)
 
@@ -109,13 +116,6 @@ data Life
   | -- | It has ended, but that is not yet known.
     Finished Result
   | Ended Result
-  deriving (Eq, Ord, Show)
-
--- | A thread is asked to stop once at most.
-data Request
-  = Unasked
-  | Asked
-  | Heard
   deriving (Eq, Ord, Show)
 
 -- | Where a reactive operator is.
@@ -133,6 +133,8 @@ data Phase
     Recovering (Maybe Thread) Thread
   | -- | The recovery has ended; the sensors have to before they start afresh.
     Resting
+  | -- | They are about to.
+    Beginning
   deriving (Eq, Ord, Show)
 
 data Moment
@@ -147,11 +149,17 @@ data Reaction
   | Conclude Result
   deriving (Eq, Ord, Show)
 
--- | What a value of a signal comes from.
-data Sensor
+-- | What a signal is made of, for one run of an operator.
+data Source
   = Watching Condition
   | Deadline Ticks
   | Polling Poller
+  | Joined Join [Source]
+  | Remembering Memory Source
+  | Settling Debouncer Source
+  | Guarding Watchdog Source
+  | -- | The nearest of those that are 'shared'.
+    Borrowed
   deriving (Eq, Ord, Show)
 
 data Poller = Poller
@@ -159,118 +167,26 @@ data Poller = Poller
   , sensor :: Program
   , slot :: Ticks
   -- ^ No reading starts before.
-  , newest :: Maybe Result
-  -- ^ Of the readings that count.
-  , request :: Request
+  , readings :: Int
+  -- ^ How many were started.
+  , newest :: Maybe (Int, Result)
+  -- ^ Which of them, and what it was.
+  , underWay :: Maybe Ticks
+  -- ^ Since when.
+  , asked :: Request
   , poll :: Poll
   }
   deriving (Eq, Ord, Show)
 
 data Poll
   = Sleeping Ticks
-  | Reading Counts Running
+  | Reading Running
   | -- | It is there, but not yet known.
-    Read Counts Result
+    Read Result
+  | -- | Likewise of the end.
+    Leaving Result
   | Rested Result
   deriving (Eq, Ord, Show)
-
--- | Whether a reading counts: it does if it began after the operator last asked.
-type Counts = Bool
-
--- * Beginning
-
--- | The program and its environment, about to begin.
-initial :: World -> State
-initial world =
-  State
-    { now = start
-    , running =
-        Looking
-          Race
-          [ thread start "firstOf: 1" (program world)
-          , Thread "firstOf: 2" (Living Unasked environment)
-          ]
-    }
- where
-  start = Now {clock = 0, levels = Map.fromList (conditions world), calls = Map.empty}
-  environment = Changing (changes world) (patience world)
-
--- | A program that is about to run.
-begin :: Now -> Program -> Running
-begin t p = case p of
-  Do name scripts -> Calling name scripts
-  Pure value -> Over (Succeeded value)
-  Then first second -> andThen t (begin t first) second
-  Else first second -> orElse t (begin t first) second
-  Attempt n act
-    | n <= 0 -> Over (Failed nothingElse)
-    | n == 1 -> begin t act
-    | otherwise -> begin t (act `Else` Attempt (n - 1) act)
-  FallbackOver [] -> Over (Failed nothingElse)
-  FallbackOver [act] -> begin t act
-  FallbackOver (act : acts) -> begin t (act `Else` FallbackOver acts)
-  Parallel left right -> Looking Race [thread t "parallel: left" (void left), thread t "parallel: right" (void right)]
-  Both left right -> Looking Gather [thread t "both: left" left, thread t "both: right" right] `AndThen` Pure Unit
-  FirstOf [] -> Over (Failed nothingElse)
-  FirstOf acts -> Looking Race (numbered "firstOf: " acts)
-  AllOf acts -> Looking Gather (numbered "allOf: " acts)
-  Scoped body -> Looking Nursery [thread t "scoped: body" body]
-  Fork act -> Forking act
-  RSelect signal _ _ -> following [signal]
-  Monitor signal _ _ -> following [signal]
-  Switch signal _ -> following [signal]
-  TeleoReactive rules -> following (map fst rules)
-  WaitUntil signal -> following [signal]
-  WhileHolding signal _ -> following [signal]
-  Timeout limit _ -> Reacting p [Deadline (clock t + limit)] (Choosing First)
- where
-  void act = act `Then` Pure Unit
-  numbered operator acts = [thread t (operator ++ show n) act | (n, act) <- zip [1 :: Int ..] acts]
-  following signals = Reacting p (map (open t) signals) (Choosing First)
-
-andThen, orElse :: Now -> Running -> Program -> Running
-andThen t (Over (Succeeded _)) second = begin t second
-andThen _ (Over other) _ = Over other
-andThen _ first second = first `AndThen` second
-orElse t (Over (Failed _)) second = begin t second
-orElse _ (Over other) _ = Over other
-orElse _ first second = first `OrElse` second
-
-ended :: Name -> Ending -> Result
-ended name = \case
-  Succeeds n -> Succeeded (Number n)
-  Fails -> Failed name
-  Faults -> Faulted name
-
--- | A thread, which may be asked to stop before it does anything at all, even end.
-thread :: Now -> Label -> Program -> Thread
-thread t label p = Thread label (Living Unasked starting)
- where
-  starting = if canWait begun then begun else Starting p
-  begun = begin t p
-  -- As long as it has not started branches of its own, nor ended, there is no telling
-  -- whether it has begun. So take it that it has: that keeps the states few.
-  canWait = \case
-    Calling _ _ -> True
-    Forking _ -> True
-    Reacting {} -> True
-    first `AndThen` _ -> canWait first
-    first `OrElse` _ -> canWait first
-    _ -> False
-
-open :: Now -> Signal -> Sensor
-open t = \case
-  Watched condition -> Watching condition
-  Polled every act ->
-    Polling
-      Poller
-        { period = every
-        , sensor = act
-        , slot = clock t
-        , newest = Nothing
-        , request = Unasked
-        , poll = Sleeping (clock t)
-        }
 
 -- * Threads
 
@@ -308,33 +224,6 @@ threadsOf = \case
   Recovering before recovery -> maybe id (:) before [recovery]
   _ -> []
 
--- * Sensors
-
-askSensor :: Sensor -> Sensor
-askSensor = \case
-  Polling s@Poller {request = Unasked} -> Polling s {request = Asked}
-  other -> other
-
--- | From now on only readings count that begin from now on.
-asAskedNow :: Sensor -> Sensor
-asAskedNow = \case
-  Polling s -> Polling s {newest = Nothing, poll = uncounted (poll s)}
-  other -> other
- where
-  uncounted = \case
-    Reading _ r -> Reading False r
-    Read _ result -> Read False result
-    other -> other
-
-rested, faulted :: Sensor -> Bool
-rested = \case
-  Polling Poller {poll = Rested _} -> True
-  Polling _ -> False
-  _ -> True
-faulted = \case
-  Polling Poller {poll = Rested (Faulted _)} -> True
-  _ -> False
-
 -- * Time
 
 -- | The moments at which something is due.
@@ -342,19 +231,28 @@ moments :: Running -> [Ticks]
 moments = \case
   Acting _ until' _ -> [until']
   Cleaning _ until' _ -> [until']
+  Tidying _ until' -> [until']
   first `AndThen` _ -> moments first
   first `OrElse` _ -> moments first
+  Obtaining _ r -> moments r
+  Answering _ r -> moments r
   Looking _ threads -> ofThreads threads
-  Reacting _ sensors phase -> ofSensors sensors ++ ofThreads (threadsOf phase)
-  Concluding _ _ sensors threads -> ofSensors sensors ++ ofThreads threads
+  Reacting _ source _ phase -> ofSource source ++ ofThreads (threadsOf phase)
+  Sharing source body -> ofSource source ++ ofThreads [body]
+  Concluding _ _ source threads -> ofSource source ++ ofThreads threads
   Changing (Change at _ _ : _) _ -> [at]
   Changing [] end -> [end]
+  Called _ r (Change at _ _ : _) _ -> at : moments r
+  Called _ r [] asking -> take 1 asking ++ moments r
   _ -> []
  where
   ofThreads threads = concat [moments r | Thread _ (Living _ r) <- threads]
-  ofSensors = concat . mapMaybe ofSensor
-  ofSensor = \case
-    Deadline end -> Just [end]
-    Polling Poller {poll = Sleeping until'} -> Just [until']
-    Polling Poller {poll = Reading _ r} -> Just (moments r)
-    _ -> Nothing
+  ofSource = \case
+    Deadline end -> [end]
+    Polling Poller {poll = Sleeping until'} -> [until']
+    Polling Poller {poll = Reading r} -> moments r
+    Joined _ sources -> concatMap ofSource sources
+    Remembering _ source -> ofSource source
+    Settling d source -> [since + delay d | Just (_, since) <- [timing d]] ++ ofSource source
+    Guarding w source -> [since + limit w | Due since <- [guarding w]] ++ ofSource source
+    _ -> []

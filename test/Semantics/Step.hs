@@ -18,7 +18,10 @@ module Semantics.Step
 
 import qualified Data.Map.Strict as Map
 
+import Semantics.Begin
 import Semantics.Program
+import Semantics.Sense
+import Semantics.Source
 import Semantics.State
 import Semantics.Verdict
 
@@ -32,16 +35,6 @@ pass :: State -> Maybe State
 pass (State t r) = case filter (> clock t) (moments r) of
   [] -> Nothing
   later -> Just (State t {clock = minimum later} r)
-
--- | A step of a part of the program may also be one that is its surroundings' business.
-data Action
-  = Happens Event
-  | Forks Program
-
-type Steps a = [(Action, Now, a)]
-
-silently :: Now -> a -> Steps a
-silently t a = [(Happens Silent, t, a)]
 
 steps :: Now -> Running -> Steps Running
 steps t = \case
@@ -59,57 +52,116 @@ steps t = \case
     [ (Happens (name `Does` maybe Stops Ends how), t, Over (maybe (Stopped Nothing) (ended (cleanupOf name)) how))
     | clock t >= until'
     ]
+  Tidying name until' -> [(Happens (name `Does` Stops), t, Over (Stopped Nothing)) | clock t >= until']
   first `AndThen` second -> [(l, t', andThen t' r second) | (l, t', r) <- steps t first]
   first `OrElse` second -> [(l, t', orElse t' r second) | (l, t', r) <- steps t first]
   Looking operator threads ->
     case verdict operator threads of
-      Just result -> silently t (conclude operator result [] threads)
+      Just result -> silently t (conclude operator result nothing threads)
       Nothing -> []
       ++ concatMap (serve operator) (oneOf (threadSteps t) threads)
-  Reacting p sensors phase ->
-    [(l, t', reacting t' p sensors' phase) | (l, t', sensors') <- oneOf (sensorSteps t) sensors]
-      ++ reactions t p sensors phase
-  Concluding operator result sensors threads
-    | all rested sensors, all over threads -> silently t (Over (outcome result sensors threads))
+  -- A reading that begins before it looks does not count.
+  Opening p -> silently t (opened t p)
+  Reacting p source v phase ->
+    [(l, t', reacting t' p source' v phase) | (l, t', source') <- sourceSteps steps hear t source]
+      ++ reactions t p source v phase
+  Sharing source body ->
+    case verdict Share [body] of
+      Just result -> silently t (conclude Share result source [body])
+      Nothing -> []
+      ++ [(l, t', Sharing source' body) | (l, t', source') <- sourceSteps steps hear t source]
+      ++ [(l, t', Sharing source' body') | (l, t', (source', body')) <- lending source (`threadSteps` body)]
+  Concluding operator result source threads
+    | rested source, all over threads -> silently t (Over (outcome operator result source threads))
     | otherwise ->
-        [(l, t', concluding operator result sensors' threads) | (l, t', sensors') <- oneOf (sensorSteps t) sensors]
-          ++ [ (if operator == Nursery then refuse l else l, t', concluding operator result sensors threads')
-             | (l, t', threads') <- oneOf (threadSteps t) threads
+        [(l, t', concluding operator result source' threads) | (l, t', source') <- sourceSteps steps hear t source]
+          ++ [ (if operator == Nursery then refuse l else l, t', concluding operator result source' threads')
+             | (l, t', (source', threads')) <- branches
              ]
-  Forking p -> [(Forks p, t, Forked)]
-  Forked -> silently t (Over (Succeeded Unit))
-  Changing (Change at condition level : others) end ->
-    [ (Happens (condition `Becomes` level), t {levels = Map.insert condition level (levels t)}, Changing others end)
-    | clock t >= at
-    ]
+   where
+    branches
+      | operator == Share = lending source (\t' -> oneOf (threadSteps t') threads)
+      | otherwise = [(l, t', (source, threads')) | (l, t', threads') <- oneOf (threadSteps t) threads]
+  Forking p Nothing -> [(Forks Nothing p, t, Forked Nothing)]
+  Forking p (Just meanwhile) ->
+    let k = length (takeWhile id (zipWith (==) [0 ..] (Map.keys (answers t))))
+     in [(Forks (Just k) p, t {answers = Map.insert k Nothing (answers t)}, Forked (Just (k, meanwhile)))]
+  Forked Nothing -> silently t (Over (Succeeded Unit))
+  Forked (Just (k, meanwhile)) -> silently t (whenSuccessful (Obtaining k) (begin t meanwhile))
+  Obtaining k (Over _) -> case Map.lookup k (answers t) of
+    Just (Just value) -> silently t {answers = Map.delete k (answers t)} (Over (Succeeded value))
+    _ -> []
+  Obtaining k r -> [(l, t', whenSuccessful (Obtaining k) r') | (l, t', r') <- steps t r]
+  Answering k (Over (Succeeded value)) ->
+    silently t {answers = Map.insert k (Just value) (answers t)} (Over (Succeeded value))
+  Answering k r -> [(l, t', whenSuccessful (Answering k) r') | (l, t', r') <- steps t r]
+  Changing (Change at condition level : others) end -> changing at condition level (Changing others end)
   Changing [] end -> if clock t >= end then silently t (Over (Succeeded timeIsUp)) else []
+  Called _ (Over result) [] [] -> silently t (Over result)
+  Called asks r coming asking ->
+    [(l, t', Called asks r' coming asking) | (l, t', r') <- steps t r]
+      ++ [ (Happens event, t, Called asks' r' coming asking)
+         | Just asks' <- [heard asks]
+         , Just (event, r') <- [hear t r]
+         ]
+      ++ case (coming, asking) of
+        (Change at condition level : others, _) -> changing at condition level (Called asks r others asking)
+        ([], at : others) | clock t >= at -> silently t (Called (askedAgain asks) r [] others)
+        _ -> []
   Over _ -> []
  where
-  serve Nursery (Forks p, t', threads)
-    | Nothing <- verdict Nursery threads = silently t' (Looking Nursery (threads ++ [thread t' "scoped: fork" p]))
+  -- The steps of those among whom a source is shared.
+  lending source ofThose =
+    [ (l, t' {shared = drop 1 (shared t')}, (source', those))
+    | (l, t', those) <- ofThose t {shared = source : shared t}
+    , source' <- take 1 (shared t')
+    ]
+  changing at condition level others =
+    [ (Happens (condition `Becomes` level), t {levels = Map.insert condition level (levels t)}, others)
+    | clock t >= at
+    ]
+  serve Nursery (Forks wanted p, t', threads)
+    | Nothing <- verdict Nursery threads = silently t' (Looking Nursery (threads ++ [forked t' wanted p]))
     | otherwise = []
   serve Nursery (l, t', threads) = [(l, t', Looking Nursery (withoutCompleted threads))]
   serve operator (l, t', threads) = [(l, t', Looking operator threads)]
   -- What is forked while all is being stopped never starts.
   refuse = \case
-    Forks _ -> Happens Silent
+    Forks _ _ -> Happens Silent
     l -> l
+  forked t' = \case
+    Nothing -> thread t' "scoped: fork"
+    Just k -> Thread "scoped: fork" . Living Unasked . Answering k . Starting
   withoutCompleted = \case
-    main : forked -> main : filter (not . completed) forked
+    main : others -> main : filter (not . completed) others
     [] -> []
 
--- | What may happen in one of several that run side by side.
-oneOf :: (a -> Steps a) -> [a] -> Steps [a]
-oneOf one = \case
-  [] -> []
-  a : as -> [(l, t, a' : as) | (l, t, a') <- one a] ++ [(l, t, a : as') | (l, t, as') <- oneOf one as]
+-- | What comes after it if it has not gone wrong.
+whenSuccessful :: (Running -> Running) -> Running -> Running
+whenSuccessful next = \case
+  Over (Succeeded value) -> next (Over (Succeeded value))
+  Over wrong -> Over wrong
+  r -> next r
 
 -- * Being asked to stop
+
+askedAgain :: Request -> Request
+askedAgain = \case
+  Asked -> AskedTwice
+  _ -> Asked
+
+-- | What is left to hear once a request was heard. Nothing: there is none.
+heard :: Request -> Maybe Request
+heard = \case
+  Asked -> Just Heard
+  AskedTwice -> Just Asked
+  _ -> Nothing
 
 -- | What becomes of it if it hears the request now. Nothing: it cannot.
 hear :: Now -> Running -> Maybe (Event, Running)
 hear t = \case
   Starting _ -> stopped
+  Opening _ -> stopped
   Calling _ _ -> stopped
   Acting name until' script
     | deaf (masking script) -> Nothing
@@ -120,59 +172,70 @@ hear t = \case
       Masked -> clock t >= until'
       Uninterruptible -> True
   Cleaning {} -> Nothing
+  Tidying name until'
+    | clock t < until' -> Just (name `Does` Hears, Over (Stopped Nothing))
+    | otherwise -> Nothing
   first `AndThen` second -> fmap (\r -> andThen t r second) <$> hear t first
   first `OrElse` second -> fmap (\r -> orElse t r second) <$> hear t first
-  Looking operator threads -> Just (Silent, conclude operator (Stopped Nothing) [] threads)
-  Reacting _ sensors phase -> Just (Silent, conclude React (Stopped Nothing) sensors (threadsOf phase))
-  Concluding _ _ sensors threads
-    | all rested sensors, all over threads -> Just (Silent, Over (outcome (Stopped Nothing) sensors threads))
+  Obtaining k r -> within' (Obtaining k) r
+  Answering k r -> within' (Answering k) r
+  Looking operator threads -> Just (Silent, conclude operator (Stopped Nothing) nothing threads)
+  Reacting _ source _ phase -> Just (Silent, conclude React (Stopped Nothing) source (threadsOf phase))
+  Sharing source body -> Just (Silent, conclude Share (Stopped Nothing) source [body])
+  Concluding operator _ source threads
+    | rested source, all over threads -> Just (Silent, Over (outcome operator (Stopped Nothing) source threads))
     | otherwise -> Nothing
-  Forking _ -> stopped
-  Forked -> stopped
+  Forking _ _ -> stopped
+  Forked _ -> stopped
   Changing _ _ -> stopped
+  Called {} -> Nothing
   Over _ -> Nothing
  where
   stopped = Just (Silent, Over (Stopped Nothing))
+  within' around = \case
+    Over _ -> stopped
+    r -> fmap (whenSuccessful around) <$> hear t r
   respond name = \case
     StopsAtOnce -> Over (Stopped Nothing)
     StopsAfter n -> Cleaning name (clock t + n) Nothing
+    TidiesUp n -> Tidying name (clock t + n)
     EndsAfter n how -> Cleaning name (clock t + n) (Just how)
 
 -- * Branches
 
 threadSteps :: Now -> Thread -> Steps Thread
 threadSteps t (Thread label life) = case life of
-  Living asked r ->
-    [(l, t', settled asked r') | (l, t', r') <- steps t r]
-      ++ [(Happens event, t, settled Heard r') | asked == Asked, Just (event, r') <- [hear t r]]
+  Living asks r ->
+    [(l, t', becomes asks r') | (l, t', r') <- steps t r]
+      ++ [(Happens event, t, becomes asks' r') | Just asks' <- [heard asks], Just (event, r') <- [hear t r]]
   Finished result -> [ends' result]
   Ended _ -> []
  where
-  settled asked = \case
+  becomes asks = \case
     Over result -> Thread label (Finished (asOutcome result))
-    r -> Thread label (Living asked r)
+    r -> Thread label (Living asks r)
   ends' result = (Happens (IsOver label), t, Thread label (Ended (asOutcome result)))
 
 -- * Reactive operators
 
-reactions :: Now -> Program -> [Sensor] -> Phase -> Steps Running
-reactions t p sensors phase = case phase of
-  Choosing moment -> case look t moment sensors of
+reactions :: Now -> Program -> Source -> View -> Phase -> Steps Running
+reactions t p source v phase = case phase of
+  Choosing moment -> case look t moment v source of
     Nothing -> []
-    Just (Left wrong) -> silently t (conclude React wrong sensors [])
-    Just (Right values) -> silently t (obey (valueOf p values))
-  Idling old -> case look t Later sensors of
-    Just (Left wrong) -> silently t (conclude React wrong sensors [])
-    Just (Right values) | valueOf p values /= old -> silently t (obey (valueOf p values))
+    Just (Left wrong) -> silently t (conclude React wrong source [])
+    Just (Right seen) -> obey seen
+  Idling old -> case look t Later v source of
+    Just (Left wrong) -> silently t (conclude React wrong source [])
+    Just (Right seen) | differs old seen -> obey seen
     _ -> []
   Following old branch ->
     inThread (Following old) branch
       -- A branch that has ended by itself is looked at first.
-      ++ case (endOf branch, look t Later sensors) of
-        (Just result, _) -> silently t (conclude React result sensors [branch])
-        (_, Just (Left wrong)) -> silently t (switching (Conclude wrong) branch)
-        (_, Just (Right values))
-          | new <- valueOf p values, new /= old -> silently t (switching (reaction p new) branch)
+      ++ case (endOf branch, look t Later v source) of
+        (Just result, _) -> silently t (conclude React result source [branch])
+        (_, Just (Left wrong)) -> silently t (switching (Conclude wrong) source branch)
+        (_, Just (Right seen@(value, t', source')))
+          | differs old seen -> silently t' (switching (reaction p (valueOf p value)) source' branch)
         _ -> []
   Switching next branch -> case endOf branch of
     Just result -> silently t (switched next result branch)
@@ -181,76 +244,49 @@ reactions t p sensors phase = case phase of
     Just result -> silently t (recovered before result recovery)
     Nothing -> inThread (Recovering before) recovery
   Resting -> []
+  Beginning -> silently t (beginning t p source)
  where
-  inThread inPlace branch = [(l, t', Reacting p sensors (inPlace branch')) | (l, t', branch') <- threadSteps t branch]
-  obey value = case reaction p value of
-    Run act -> Reacting p sensors (Following value (thread t (nameOf p value) act))
-    RunToEnd recovery -> recover Nothing (map askSensor sensors) recovery
-    Idle -> Reacting p sensors (Idling value)
-    Conclude result -> conclude React result sensors []
+  inThread inPlace branch = [(l, t', Reacting p source v (inPlace branch')) | (l, t', branch') <- threadSteps t branch]
+  differs old (value, _, _) = valueOf p value /= old
+  obey (seen, t', source') = silently t' $ case reaction p value of
+    Run act -> Reacting p source' v (Following value (thread t' (nameOf p value) act))
+    RunToEnd recovery -> recover Nothing (askSource source') recovery
+    Idle -> Reacting p source' v (Idling value)
+    Conclude result -> conclude React result source' []
+   where
+    value = valueOf p seen
   -- Unless there will be nothing to sense, the sensors go on.
-  switching next branch = Reacting p (alike sensors) (Switching next (ask branch))
+  switching next source' branch = Reacting p (alike source') v (Switching next (ask branch))
    where
     alike = case next of
       Run _ -> id
       Idle -> id
-      _ -> map askSensor
+      _ -> askSource
   switched next result branch = case (next, result) of
-    (Conclude result', Stopped _) -> conclude React result' sensors []
-    (Conclude _, _) -> conclude React result sensors [branch]
-    (RunToEnd _, Succeeded _) -> conclude React result sensors []
-    (RunToEnd recovery, Stopped _) -> recover Nothing sensors recovery
-    (RunToEnd recovery, _) -> recover (Just branch) sensors recovery
-    (_, Stopped _) -> Reacting p (map asAskedNow sensors) (Choosing Later)
-    _ -> conclude React result sensors [branch]
-  recover before sensors' recovery = Reacting p sensors' (Recovering before (thread t "monitor: recovery" recovery))
+    (Conclude result', Stopped _) -> conclude React result' source []
+    (Conclude _, _) -> conclude React result source [branch]
+    (RunToEnd _, Succeeded _) -> conclude React result source []
+    (RunToEnd recovery, Stopped _) -> recover Nothing source recovery
+    (RunToEnd recovery, _) -> recover (Just branch) source recovery
+    (_, Stopped _) -> Reacting p source (viewOf t source) (Choosing Later)
+    _ -> conclude React result source [branch]
+  recover before source' recovery = Reacting p source' v (Recovering before (thread t "monitor: recovery" recovery))
   recovered before result recovery = case (before >>= endOf, result) of
-    (Just wrong, _) -> conclude React wrong sensors (maybe id (:) before [recovery])
-    (_, Succeeded _) -> reacting t p sensors Resting
-    _ -> conclude React result sensors [recovery]
+    (Just wrong, _) -> conclude React wrong source (maybe id (:) before [recovery])
+    (_, Succeeded _) -> reacting t p source v Resting
+    _ -> conclude React result source [recovery]
 
 -- | An operator whose sensors have taken a step.
-reacting :: Now -> Program -> [Sensor] -> Phase -> Running
-reacting t p sensors phase = case phase of
+reacting :: Now -> Program -> Source -> View -> Phase -> Running
+reacting t p source v phase = case phase of
   Resting
-    | any faulted sensors -> conclude React (Failed "a sensor faulted") sensors []
-    | all rested sensors -> Reacting p (map restarted sensors) (Choosing Later)
-  _ -> Reacting p sensors phase
+    | not (null (faultsOf source)) -> conclude React (Failed "a sensor faulted") source []
+    | rested source, any borrows (signals p) -> Reacting p source v Beginning
+    | rested source -> beginning t p source
+  _ -> Reacting p source v phase
+
+-- | It begins once more.
+beginning :: Now -> Program -> Source -> Running
+beginning t p source = Reacting p fresh (viewOf t fresh) (Choosing Later)
  where
-  restarted = \case
-    Polling s -> Polling s {newest = Nothing, request = Unasked, poll = Sleeping (max (clock t) (slot s))}
-    other -> other
-
--- * Sensors
-
-sensorSteps :: Now -> Sensor -> Steps Sensor
-sensorSteps t = \case
-  Polling poller -> [(l, t', Polling s) | (l, t', s) <- pollerSteps t poller]
-  _ -> []
-
-pollerSteps :: Now -> Poller -> Steps Poller
-pollerSteps t s =
-    case poll s of
-      Sleeping until'
-        | clock t >= until' -> silently t (read' s {slot = clock t + period s} True (begin t (sensor s)))
-      Reading counts r -> [(l, t', read' s counts r') | (l, t', r') <- steps t r]
-      Read counts result ->
-        silently t s {newest = if counts then Just result else newest s, poll = Sleeping (nextSlot (slot s))}
-      _ -> []
-      ++ [(Happens event, t, s') | request s == Asked, Just (event, s') <- [hears]]
- where
-  read' p counts = \case
-    Over result
-      -- Nobody wants the reading any more; but what went wrong is not lost.
-      | request p /= Unasked -> p {poll = Rested (asOutcome result)}
-      | otherwise -> p {poll = Read counts result}
-    r -> p {poll = Reading counts r}
-  hears = case poll s of
-    Reading counts r -> fmap (read' heard counts) <$> hear t r
-    Rested _ -> Nothing
-    _ -> Just (Silent, heard {poll = Rested (Stopped Nothing)})
-  heard = s {request = Heard}
-  -- Slots that were missed are skipped.
-  nextSlot next
-    | next >= clock t = next
-    | otherwise = nextSlot (next + period s)
+  fresh = startedAt t source

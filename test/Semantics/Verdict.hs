@@ -1,5 +1,3 @@
-{-# LANGUAGE LambdaCase #-}
-
 -- |
 -- What operators decide when they look.
 module Semantics.Verdict
@@ -10,17 +8,16 @@ module Semantics.Verdict
   , outcome
 
     -- * What to do for a signal
-  , look
   , valueOf
   , reaction
   , nameOf
   ) where
 
-import Data.List (find, findIndex)
-import qualified Data.Map.Strict as Map
-import Data.Maybe (fromMaybe, mapMaybe)
+import Data.List (find)
+import Data.Maybe (mapMaybe)
 
 import Semantics.Program
+import Semantics.Source
 import Semantics.State
 
 -- * What comes of the branches
@@ -30,6 +27,7 @@ verdict :: Operator -> [Thread] -> Maybe Result
 verdict operator threads = case operator of
   -- The first to finish; on a tie the left one.
   Race -> firstOf ends'
+  Share -> firstOf ends'
   -- The first that does not complete; on a tie the left one.
   Gather
     | all completed threads -> Just (Succeeded (Several [value | Succeeded value <- ends']))
@@ -45,63 +43,45 @@ verdict operator threads = case operator of
   firstOf = find (const True)
 
 -- | Having come to a verdict, an operator asks all that still runs to stop, at once.
-conclude :: Operator -> Result -> [Sensor] -> [Thread] -> Running
-conclude operator result sensors threads =
-  concluding operator result (map askSensor sensors) (map ask threads)
+conclude :: Operator -> Result -> Source -> [Thread] -> Running
+conclude operator result source threads =
+  concluding operator result (askSource source) (map ask threads)
 
--- | ... and waits until all has ended. Of those that have, only faults matter.
-concluding :: Operator -> Result -> [Sensor] -> [Thread] -> Running
-concluding operator result sensors threads
-  | Stopped _ <- result, all rested living, all over remaining = Over (outcome result living remaining)
-  | otherwise = Concluding operator result living remaining
+-- | ... and waits until all has ended. Of those that have, only faults matter; but a
+-- body may still look at what is shared.
+concluding :: Operator -> Result -> Source -> [Thread] -> Running
+concluding operator result source threads
+  | Stopped _ <- result, rested kept, all over living = Over (outcome operator result kept living)
+  | otherwise = Concluding operator result kept living
  where
-  living = filter (\s -> not (rested s) || faulted s) sensors
-  remaining = filter (not . harmless) threads
+  living = filter (not . harmless) threads
+  kept
+    | operator == Share, not (all over living) = source
+    | otherwise = remaining source
   harmless thread' = over thread' && null (faultOf thread')
 
 -- | The caller's cancellation comes first, then the leftmost fault, then the verdict.
-outcome :: Result -> [Sensor] -> [Thread] -> Result
-outcome result sensors threads = case (result, faults) of
+outcome :: Operator -> Result -> Source -> [Thread] -> Result
+outcome operator result source threads = case (result, faults) of
   (Stopped _, fault : _) -> Stopped (Just fault)
   (_, fault : _) -> Faulted fault
   _ -> result
  where
-  faults =
-    [fault | Polling Poller {poll = Rested (Faulted fault)} <- sensors]
-      ++ concatMap faultOf threads
+  faults
+    -- The one starts its body first, the others their sensors.
+    | operator == Share = concatMap faultOf threads ++ faultsOf source
+    | otherwise = faultsOf source ++ concatMap faultOf threads
 
 -- * What to do for a signal
 
--- | A look at all the sensors. Nothing: there is no value yet.
-look :: Now -> Moment -> [Sensor] -> Maybe (Either Result [Int])
-look t moment = \case
-  [] -> Just (Right [])
-  s : others -> case lookAt s of
-    Just (Right value) -> fmap (value :) <$> look t moment others
-    Just (Left wrong) -> Just (Left wrong)
-    Nothing -> Nothing
- where
-  lookAt = \case
-    Watching condition -> case (Map.lookup condition (levels t), moment) of
-      (Just (At n), _) -> Just (Right n)
-      (Just Failing, _) -> Just (Left (Failed condition))
-      (Just Faulting, _) -> Just (Left (Faulted condition))
-      (_, First) -> Nothing
-      (_, Later) -> Just (Left (Failed noValue))
-    Deadline end -> Just (Right (fromEnum (clock t >= end)))
-    Polling s -> case newest s of
-      Nothing -> Nothing
-      Just (Succeeded value) -> Just (Right (number value))
-      Just wrong -> Just (Left wrong)
+-- | What an operator follows of the value of its signal.
+valueOf :: Program -> Int -> Int
+valueOf p value = case p of
+  Switch {} -> value
+  TeleoReactive _ -> value
+  _ -> fromEnum (holds value)
 
--- | The one value that an operator follows.
-valueOf :: Program -> [Int] -> Int
-valueOf p values = case p of
-  Switch {} -> sum values
-  TeleoReactive _ -> fromMaybe (-1) (findIndex holds values)
-  _ -> fromEnum (any holds values)
-
--- | What is to be done for the values of the signal.
+-- | What is to be done for the value of the signal.
 reaction :: Program -> Int -> Reaction
 reaction p value = case p of
   RSelect _ left right -> Run (if isTrue then left else right)
@@ -110,7 +90,7 @@ reaction p value = case p of
   TeleoReactive rules -> if value < 0 then Idle else Run (snd (rules !! value))
   WaitUntil _ -> if isTrue then Conclude (Succeeded Unit) else Idle
   WhileHolding _ act -> if isTrue then Run act else Conclude (Failed doesNotHold)
-  Timeout limit act -> if isTrue then Conclude (Failed (timedOut limit)) else Run act
+  Timeout most act -> if isTrue then Conclude (Failed (timedOut most)) else Run act
   _ -> Idle
  where
   isTrue = holds value

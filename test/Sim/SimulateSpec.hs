@@ -243,8 +243,8 @@ unwinding = do
   it "so it is when whoever simulates is cancelled" $ do
     book <- newIORef []
     begun <- newEmptyMVar
-    let busy = (putMVar begun () >> forever checkpoint) `finally` modifyIORef book ("cleaned up" :)
-    withAsync (simulateWith defaults {standstill = maxBound} (parallel busy (atomically retry :: Behavior ()))) $ \caller -> do
+    let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef book ("cleaned up" :)
+    withAsync (simulateWith defaults {standstill = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
       takeMVar begun
       cancel caller
     readIORef book `shouldReturn` ["cleaned up"]

@@ -22,10 +22,11 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), finally, onException, throwIO)
 import Control.Monad (filterM, void)
 import Data.Foldable (asum, toList)
+import Data.Maybe (listToMaybe)
 import Data.Traversable (for, mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, failed)
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Runtime (Label (..), atomically, atomicallyUnless)
 import Behavior.Internal.Scope
 
 -- $setup
@@ -130,7 +131,11 @@ numbered operator = mapAccumL (\n act -> (n + 1, (Label operator (show n), act))
 race :: [(Label, Behavior a)] -> Behavior a
 race behaviors = structured $ \scope -> do
   branches <- traverse (uncurry (branch scope)) behaviors
-  settle <$> atomically (asum (outcome <$> branches))
+  settle <$> atomicallyUnless (leftmost branches) (asum (outcome <$> branches))
+ where
+  -- Only the left one: of the others it could not be said that the left one had not
+  -- ended before.
+  leftmost = maybe (pure Nothing) outcomeNow . listToMaybe
 
 gather :: Traversable t => t (Label, Behavior a) -> Behavior (t a)
 gather behaviors = structured $ \scope -> do
@@ -138,9 +143,11 @@ gather behaviors = structured $ \scope -> do
   -- n looks at two variables, and not n looks at n.
   trouble <- newTVarIO False
   branches <- for behaviors $ \(label, act) -> branch scope label (act `alarming` trouble)
-  let waiting [] = pure (traverse (atomically . completed) branches)
+  let waiting [] = pure (traverse (\b -> atomicallyUnless (completedNow b) (completed b)) branches)
       waiting (b : bs) = do
-        quiet <- atomically ((True <$ completed b) `orElse` (False <$ (readTVar trouble >>= check)))
+        quiet <-
+          atomicallyUnless ((True <$) <$> completedNow b) $
+            (True <$ completed b) `orElse` (False <$ (readTVar trouble >>= check))
         if quiet then waiting bs else throwIO <$> atomically (asum (uncompleted <$> branches))
   waiting (toList branches)
 

@@ -27,7 +27,7 @@ import Data.Foldable (asum)
 import Data.List (findIndex)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Runtime (Label (..), atomically, atomicallyUnless)
 import Behavior.Internal.Scope
 import Behavior.Internal.Source
 
@@ -74,11 +74,11 @@ react operator signal reaction = structured $ \scope -> do
             -- The branch is looked at first: one that has ended by itself is not
             -- interrupted, whatever the signal says in the same transaction.
             event <-
-              observe $
+              observeUnless (fmap Left <$> outcomeNow running) $
                 (Right . Left <$> outcome running)
                   `orElse` (fmap Right <$> attend sensors (changed value old))
             case event of
-              Right (Left ended) -> pure (settle ended)
+              Right (Left end) -> pure (settle end)
               Right (Right new) -> interrupt sensors running (reaction new)
               Left dead -> interrupt sensors running (Conclude (throwIO dead))
 
@@ -88,7 +88,7 @@ react operator signal reaction = structured $ \scope -> do
         Conclude verdict ->
           stopping (sensors `and'` running) >>= \case
             Stopped _ -> pure verdict
-            ended -> pure (settle ended)
+            end -> pure (settle end)
         RunToEnd name recovery ->
           stopping (sensors `and'` running) >>= \case
             Completed a -> pure (pure a)
@@ -102,17 +102,17 @@ react operator signal reaction = structured $ \scope -> do
               forget scope running
               seen <- atomically (view source)
               choose sensors seen Later
-            ended -> pure (settle ended)
+            end -> pure (settle end)
        where
         others `and'` b = map SomeBranch others ++ [SomeBranch b]
-        stopping branches = ask branches >> atomically (outcome running)
+        stopping branches = ask branches >> ended running
 
       -- The sensors were asked to stop. The recovery does not wait for those that
       -- are slow to, but what comes after it does.
       recover sensors name recovery aftermath = do
         recovered <- branch scope (Label operator name) recovery
-        ended <- atomically (outcome recovered)
-        case (result ended, aftermath) of
+        end <- ended recovered
+        case (result end, aftermath) of
           (_, Just verdict) -> pure verdict
           (Left wrong, Nothing) -> pure (throwIO wrong)
           (Right (), Nothing) -> do
@@ -134,11 +134,15 @@ attend sensors value = (Left <$> asum (map lost sensors)) `orElse` (Right <$> va
 observe :: STM (Either SomeException a) -> IO (Either SomeException a)
 observe = fmap join . trySynchronous . atomically
 
+-- | Likewise, if a glance does not make that needless.
+observeUnless :: IO (Maybe a) -> STM (Either SomeException a) -> IO (Either SomeException a)
+observeUnless glance = fmap join . trySynchronous . atomicallyUnless (fmap Right <$> glance)
+
 -- | Waits until a branch that was asked to stop has ended. If it faulted it stays
 -- in the scope, which throws its fault.
 rest :: Scope -> Branch () -> IO Bool
 rest scope sensor =
-  atomically (outcome sensor) >>= \case
+  ended sensor >>= \case
     Faulted _ -> pure False
     _ -> True <$ forget scope sensor
 

@@ -21,7 +21,8 @@ module Behavior.Internal.Runtime
 
     -- * Waiting
   , atomically
-  , atomicallyFirmly
+  , firmly
+  , atomicallyUnless
   , checkpoint
 
     -- * Time
@@ -38,7 +39,7 @@ module Behavior.Internal.Runtime
   , reportingTo
   ) where
 
-import Control.Concurrent (ThreadId, forkIO, forkIOWithUnmask, myThreadId, threadDelay, throwTo)
+import Control.Concurrent (ThreadId, forkIO, forkIOWithUnmask, myThreadId, threadDelay, throwTo, yield)
 import Control.Concurrent.STM (STM, TVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
@@ -162,13 +163,25 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
  where
   simulated simulation = transact simulation transaction
 
--- | 'atomically' that nothing can interrupt; for the end of threads that were asked to
--- stop. GHC's deadlock detector is not heeded: it takes a thread that waits for a
--- cleanup which itself was just woken by the detector for deadlocked too.
-atomicallyFirmly :: STM a -> IO a
-atomicallyFirmly transaction = uninterruptibleMask_ waiting
+-- | 'atomically', where a glance may make the transaction needless: of those who wait for
+-- each other most are done when they have had their turn, and to wait in a transaction
+-- is dear.
+--
+-- What the glance gives must be what the transaction would have, at some moment
+-- meanwhile: it should look at one variable only. (In a simulation there is no glance.)
+atomicallyUnless :: IO (Maybe a) -> STM a -> IO a
+atomicallyUnless glance transaction = inSimulation really simulated
  where
-  waiting = try (atomically transaction) >>= either (\BlockedIndefinitelyOnSTM -> waiting) pure
+  really = glance >>= maybe (yield >> glance >>= maybe (STM.atomically transaction) pure) pure
+  simulated simulation = transact simulation transaction
+
+-- | A wait that nothing can interrupt; for the end of threads that were asked to stop.
+-- GHC's deadlock detector is not heeded: it takes a thread that waits for a cleanup which
+-- itself was just woken by the detector for deadlocked too.
+firmly :: IO a -> IO a
+firmly waiting = uninterruptibleMask_ again
+ where
+  again = try waiting >>= either (\BlockedIndefinitelyOnSTM -> again) pure
 
 -- | A moment at which the others may run, and a cancellation that is under way
 -- arrives, if the masking state allows it.

@@ -20,6 +20,8 @@ module Behavior.Internal.Scope
     -- * Branches
   , Branch
   , outcome
+  , outcomeNow
+  , ended
   , SomeBranch (..)
   , branch
   , worker
@@ -30,6 +32,7 @@ module Behavior.Internal.Scope
     -- * How a branch ends
   , Outcome (..)
   , completed
+  , completedNow
   , uncompleted
   , settle
   , result
@@ -115,10 +118,8 @@ end (Scope branches) = do
   started <- reverse <$> readIORef branches
   -- Nothing may interrupt this, or the rest would be orphaned.
   uninterruptibleMask_ (ask started)
-  concat <$> traverse (\(SomeBranch b) -> faults <$> ended b) started
+  concat <$> traverse (\(SomeBranch b) -> faults <$> firmly (ended b)) started
  where
-  -- Most have ended by now, and then no transaction is needed.
-  ended b = threadEnded (branchThread b) >>= maybe (atomicallyFirmly (outcome b)) (pure . ending b)
   faults = \case
     Faulted e -> [e]
     _ -> []
@@ -173,8 +174,20 @@ stopping = Stop . branchId
 -- | Marks a branch as asked. False if it was asked before, or has ended.
 marked :: SomeBranch -> IO Bool
 marked (SomeBranch b) = do
-  ended <- isJust <$> threadEnded (branchThread b)
-  if ended then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
+  hasEnded <- isJust <$> threadEnded (branchThread b)
+  if hasEnded then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
+
+-- | Waits for the end of the branch.
+ended :: Branch a -> IO (Outcome a)
+ended b = atomicallyUnless (outcomeNow b) (outcome b)
+
+-- | How the branch has ended, if it has.
+outcomeNow :: Branch a -> IO (Maybe (Outcome a))
+outcomeNow b = fmap (ending b) <$> threadEnded (branchThread b)
+
+-- | What the branch has returned, if it has.
+completedNow :: Branch a -> IO (Maybe a)
+completedNow b = (>>= either (const Nothing) Just . result) <$> outcomeNow b
 
 -- | Waits until the branch has completed.
 completed :: Branch a -> STM a

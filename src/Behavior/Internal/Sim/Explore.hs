@@ -111,7 +111,7 @@ instance Show Counterexample where
     intercalate
       "\n"
       [ "schedule " ++ show (foundAfter c) ++ " fails:"
-      , indented (displayException (because c))
+      , indented (text (because c))
       , "shrunk to " ++ counted (failing c) ++ ", this happens:"
       , dropWhileEnd (== '\n') (narrate (story c))
       , "to see it again: explore (replaying (" ++ show (failing c) ++ "))"

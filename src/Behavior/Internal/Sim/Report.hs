@@ -6,9 +6,10 @@ module Behavior.Internal.Sim.Report
   ( explain
   , narrate
   , aside
+  , text
   ) where
 
-import Control.Exception (SomeException, displayException)
+import Control.Exception (SomeException (..), displayException)
 import Data.List (groupBy, intercalate)
 import Numeric (showFFloat)
 
@@ -87,5 +88,6 @@ aside = \case
 commas :: [Label] -> String
 commas = intercalate ", " . map show
 
+-- | What an exception says of itself, without GHC's own additions.
 text :: SomeException -> String
-text = displayException
+text (SomeException e) = displayException e
