@@ -16,6 +16,7 @@ import qualified Behavior.ReactiveSpec
 import qualified Behavior.RefinedSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
+import qualified Behavior.ScopedSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
 import qualified Behavior.StormSpec
@@ -38,7 +39,9 @@ import qualified Sim.SimulateSpec
 main :: IO ()
 main = hspec $ do
   describe "Failure" Behavior.FailureSpec.spec
-  describe "Parallel" Behavior.ParallelSpec.spec
+  describe "Parallel" $ do
+    Behavior.ParallelSpec.spec
+    describe "scoped and fork" Behavior.ScopedSpec.spec
   describe "Signal" $ do
     Behavior.SignalSpec.spec
     Behavior.PollingSpec.spec

@@ -2,8 +2,7 @@
 {-# LANGUAGE UnboxedTuples #-}
 
 -- |
--- A number that many threads change at once: an eighth of the cost of an 'Data.IORef.IORef'
--- that is modified atomically.
+-- A number that many threads change at once, by one machine instruction.
 module Behavior.Internal.Counter
   ( Counter
   , newCounter
