@@ -83,6 +83,11 @@ subtle =
     (alone (WithShared (Polled 1 (act 9 "s" Fails (EndsAfter 0 Fails))) (deaf 2 "a" `Then` (WaitUntil Shared `Else` act 1 "b" Fails StopsAtOnce))))
       { patience = 1
       }
+  , -- What is shared faults before the body does, which stands first all the same.
+    (alone (WithShared (Polled 1 (act 9 "s" Fails (EndsAfter 0 Faults))) (act 9 "b" Fails (EndsAfter 1 Faults))))
+      { patience = 1
+      , caller = Stranger 9
+      }
   , -- It was high, unnoticed by the operator.
     (alone (RSelect (And (Hysteresis 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
       { changes = [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "q" (At 1)]

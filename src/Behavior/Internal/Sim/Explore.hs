@@ -164,6 +164,10 @@ explore plan property =
 
 -- | 'explore' that gives the counterexample.
 --
+-- >>> found <- exploring (exhaustively 1) (\simulate -> simulate (sleep 1) >>= \run -> if finished run > 0 then fail "late" else pure ())
+-- >>> either failing (error . show) found
+-- Switching []
+--
 -- @since 0.1.0.0
 exploring
   :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)

@@ -16,7 +16,19 @@ import Numeric (showFFloat)
 import Behavior.Internal.Seam (Label, Seconds (..))
 import Behavior.Internal.Sim.Types
 
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Sim
+-- >>> import Behavior.Time (atomically)
+-- >>> import Control.Concurrent.STM (retry)
+
 -- | How a run ended, in words; and if it is a mistake, what to do about it.
+--
+-- >>> run <- simulate (both (sleep 1) (atomically retry))
+-- >>> putStrLn (explain (outcome run))
+-- deadlock: every thread waits, and nothing in the simulation will wake one
+--   main waits for its branches: both: right
+--   both: right waits for a transaction
 --
 -- @since 0.1.0.0
 explain :: Outcome a -> String
@@ -57,6 +69,14 @@ instead = \case
     \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
 
 -- | What happened, a line for each step (what repeats itself is told once).
+--
+-- >>> run <- simulate (parallel (sleep 1) (sleep 2))
+-- >>> putStr (narrate (steps run))
+--      0.000 s  1 parallel: left   starts
+--      0.000 s  2 parallel: right  starts
+--      1.000 s  1 parallel: left   ends
+--      1.000 s  2 parallel: right  is interrupted: Stop: the operator that started this behaviour no longer wants it
+--      1.000 s  2 parallel: right  ends
 --
 -- @since 0.1.0.0
 narrate :: [Step] -> String

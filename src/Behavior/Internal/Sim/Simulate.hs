@@ -22,15 +22,43 @@ import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Sim.Watchdog
 
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Sim
+-- >>> import Behavior.Time (now)
+
 -- | Runs a behaviour in a simulation, by the undisturbed schedule.
 --
 -- > simulate  =  simulateWith defaults
+--
+-- [Result] What came of it, however it ended: its failures and faults are there too, and
+--   so are deadlock, livelock and the mistakes that a simulation finds ('Outcome').
+-- [Fault] A simulation inside of a simulation is refused with an 'ErrorCall'.
+-- [Cancellation] Of whoever simulates: the run is ended, and it is thrown then.
+--
+-- When it returns or throws, all threads of the run have ended, one after the other,
+-- the youngest first. (When the run was cut off, a cleanup's transactions are done and its
+-- sleeps are over at once, but what it waits for never comes.)
+--
+-- >>> run <- simulate (sleep 3600 >> now)
+-- >>> explain (outcome run)
+-- "it returned"
+-- >>> finished run
+-- 3600.0
 --
 -- @since 0.1.0.0
 simulate :: Behavior a -> IO (Run a)
 simulate = simulateWith defaults
 
 -- | 'simulate' as the options say.
+--
+-- >>> run <- simulateWith defaults {scheduled = Seeded 7} (both (sleep 1) (sleep 2))
+-- >>> finished run
+-- 2.0
+--
+-- >>> run <- simulateWith defaults {endAt = 10} (sleep 3600)
+-- >>> explain (outcome run)
+-- "the virtual time has come to the end that was set"
 --
 -- @since 0.1.0.0
 simulateWith :: Options -> Behavior a -> IO (Run a)
