@@ -130,8 +130,8 @@ renamed :: Program -> Program
 renamed p = fst (named p (map (('a' :) . show) [1 :: Int ..]))
 
 named :: Program -> [Name] -> (Program, [Name])
-named p names = case p of
-  Do _ scripts -> (Do (head names) scripts, tail names)
+named p names = case (p, names) of
+  (Do _ scripts, name : others) -> (Do name scripts, others)
   _ -> let (parts', rest) = go (parts p) in (rebuild p parts', rest)
  where
   go = \case
