@@ -168,10 +168,11 @@ selecting = do
       notes book `shouldReturn` ["left"]
 
   it "hears its own cancellation while a branch is slow to hear the stop, and stops its sensor then" $ do
-    -- The branch is asked at 1, and hears nothing until 5. The caller is cancelled at 3.
+    -- The branch is asked at 1.2, and hears nothing until 5. The caller is cancelled at 3:
+    -- it no longer waits to be heard, and so has to ask again.
     readings' <- newIORef []
     let test = now >>= \t -> (t < 1) <$ modifyIORef readings' (t :)
-        slow = uninterruptibleMask_ (sleep 5)
+        slow = uninterruptibleMask_ (sleep 5) >> sleep 100
     run <- simulate (timeout 3 (Signal.rSelect (Signal.polling 0.4 test) slow (pure ())))
     finished run `shouldBe` 5
     readIORef readings' >>= (`shouldSatisfy` (<= 3)) . maximum
