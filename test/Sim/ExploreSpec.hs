@@ -117,6 +117,17 @@ counterexample = do
         other -> fail (explain other)
     either show show found `shouldSatisfy` ("both: right waits for a transaction" `isInfixOf`)
 
+  it "says so when what it tells did not happen again" $ do
+    runs <- newIORef (0 :: Int)
+    found <- exploring (randomly 100) $ \run -> do
+      modifyIORef runs (+ 1)
+      n <- readIORef runs
+      _ <- run (sleep 1)
+      when (n == 5) (fail "the fifth run")
+    case found of
+      Left c -> show c `shouldSatisfy` \told -> all (`isInfixOf` told) ["the fifth run", "run again, this did not happen"]
+      Right _ -> expectationFailure "it should have been found"
+
 properties :: Spec
 properties = do
   it "need not simulate" $ schedules <$> explore (randomly 3) (const (pure ())) `shouldReturn` 3

@@ -126,6 +126,17 @@ instance Show Counterexample where
 
 instance Exception Counterexample
 
+-- | What the property threw once, but not when the same schedule was run again.
+newtype Unrepeatable = Unrepeatable SomeException
+
+instance Show Unrepeatable where
+  show (Unrepeatable e) =
+    text e
+      ++ "\nBut when the same schedule was run again, this did not happen. Something in it is not simulated: \
+         \a clock, a random number, a thread of forkIO, what an earlier run left behind?"
+
+instance Exception Unrepeatable
+
 -- | One run of the property: what it threw, and the run that it made.
 data Trial = Trial
   { thrown :: Maybe SomeException
@@ -219,7 +230,8 @@ exploring (Plan how o) property = case how of
     (fewer, e') <- shrunk (switches t) e
     (fewest, e'') <- simplest fewer e'
     again <- attempting o {detailed = True} (switching True fewest) property
-    pure Counterexample {failing = Switching fewest, because = e'', story = happened again, foundAfter = i}
+    let why = fromMaybe (toException (Unrepeatable e'')) (thrown again)
+    pure Counterexample {failing = Switching fewest, because = why, story = happened again, foundAfter = i}
 
   -- To leave out one switch moves what comes after it, so that the others may miss their
   -- points. So it looks afresh, the schedules with the fewest switches first.
