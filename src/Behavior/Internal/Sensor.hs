@@ -28,7 +28,7 @@ import Behavior.Internal.Source
 -- branch was stopped it waits for the next slot.
 --
 -- A reading that fails or faults is no value: the operator throws the same. The
--- number of seconds must be more than zero (an 'ErrorCall' says so).
+-- number of seconds must be more than zero (an 'Control.Exception.ErrorCall' says so).
 --
 -- >>> import Data.IORef
 -- >>> level <- newIORef (12 :: Int)
