@@ -92,15 +92,17 @@ start label act = do
       really = do
         add livingCount 1
         forkIOWithUnmask $ \unmask -> do
-          end <- life label act (pure ()) unmask
+          end <- life tell label act (pure ()) unmask
           STM.atomically (publish end)
-      simulated simulation = spawn simulation label (life label act) publish <* add livingCount 1
+      simulated simulation =
+        spawn simulation label (life (\event -> tell event >> record simulation event) label act) publish
+          <* add livingCount 1
   thread <- inSimulation really simulated
   pure (Thread thread result)
 
--- | What a thread does, and how the action ended. It begins by what is given.
-life :: Label -> IO a -> IO () -> (forall b. IO b -> IO b) -> IO (Either SomeException a)
-life label act begin unmask = do
+-- | What a thread does (it reports, and begins, as it is told), and how the action ended.
+life :: (Event -> IO ()) -> Label -> IO a -> IO () -> (forall b. IO b -> IO b) -> IO (Either SomeException a)
+life report label act begin unmask = do
   when labelling $ myThreadId >>= \self -> labelThread self (show label)
   report (Started label)
   end <- try (unmask (begin >> act))
@@ -259,12 +261,11 @@ reportingTo sink = bracket_ (writeIORef eventSink (Just sink)) (writeIORef event
 
 -- | Says something that whoever watches should know.
 note :: String -> IO ()
-note = report . Noted
+note text = tell (Noted text) >> inSimulation (pure ()) (\simulation -> record simulation (Noted text))
 
-report :: Event -> IO ()
-report event = do
-  readIORef eventSink >>= \sink -> for_ sink ($ event)
-  inSimulation (pure ()) (`record` event)
+-- | Reports an event to the sink, if there is one.
+tell :: Event -> IO ()
+tell event = readIORef eventSink >>= \sink -> for_ sink ($ event)
 
 eventSink :: IORef (Maybe (Event -> IO ()))
 eventSink = unsafePerformIO (newIORef Nothing)
