@@ -83,32 +83,48 @@ threadEnded = STM.readTVarIO . threadResult
 
 -- | Starts a thread in which the action runs unmasked, whatever the caller's
 -- masking state. Call it masked, or the thread may be lost before it is returned.
+--
+-- (What is inlined here, and what is not, is so that the switch costs nothing.)
 start :: Label -> IO a -> IO (Thread a)
-start label act = do
+start label act = inSimulation (startReally label act) (startSimulated label act)
+{-# INLINE start #-}
+
+startReally :: Label -> IO a -> IO (Thread a)
+startReally label act = do
   result <- STM.newTVarIO Nothing
-  let publish = STM.writeTVar result . Just
-      -- Forked masked: an exception cannot strike before 'try' is in place, nor
-      -- between the end of the action and the publication of how it ended.
-      really = do
-        add livingCount 1
-        forkIOWithUnmask $ \unmask -> do
-          end <- life tell label act (pure ()) unmask
-          STM.atomically (publish end)
-      simulated simulation =
-        spawn simulation label (life (\event -> tell event >> record simulation event) label act) publish
-          <* add livingCount 1
-  thread <- inSimulation really simulated
+  add livingCount 1
+  -- Forked masked: an exception cannot strike before 'try' is in place, nor
+  -- between the end of the action and the publication of how it ended.
+  thread <- forkIOWithUnmask $ \unmask -> do
+    end <- life tell label act (pure ()) unmask
+    STM.atomically (STM.writeTVar result (Just end))
   pure (Thread thread result)
+{-# INLINE startReally #-}
+
+startSimulated :: Label -> IO a -> Simulator -> IO (Thread a)
+startSimulated label act simulation = do
+  result <- STM.newTVarIO Nothing
+  let report event = tell event >> record simulation event
+  thread <- spawn simulation label (life report label act) (STM.writeTVar result . Just)
+  add livingCount 1
+  pure (Thread thread result)
+{-# NOINLINE startSimulated #-}
 
 -- | What a thread does (it reports, and begins, as it is told), and how the action ended.
 life :: (Event -> IO ()) -> Label -> IO a -> IO () -> (forall b. IO b -> IO b) -> IO (Either SomeException a)
 life report label act begin unmask = do
-  when labelling $ myThreadId >>= \self -> labelThread self (show label)
+  when labelling (bear label)
   report (Started label)
   end <- try (unmask (begin >> act))
   report (Ended label)
   add livingCount (-1)
   pure end
+{-# INLINE life #-}
+
+-- | The calling thread has this label from now on.
+bear :: Label -> IO ()
+bear label = myThreadId >>= \self -> labelThread self (show label)
+{-# NOINLINE bear #-}
 
 -- | Whether labels can be seen by anybody. Before GHC 9.6 only an event log shows them,
 -- and to label a thread costs more than to start it.
@@ -172,10 +188,11 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
 -- What the glance gives must be what the transaction would have, at some moment
 -- meanwhile: it should look at one variable only. (In a simulation there is no glance.)
 atomicallyUnless :: IO (Maybe a) -> STM a -> IO a
-atomicallyUnless glance transaction = inSimulation really simulated
- where
-  really = glance >>= maybe (yield >> glance >>= maybe (STM.atomically transaction) pure) pure
-  simulated simulation = transact simulation transaction
+atomicallyUnless glance transaction =
+  inSimulation (reallyUnless glance transaction) (\simulation -> transact simulation transaction)
+
+reallyUnless :: IO (Maybe a) -> STM a -> IO a
+reallyUnless glance transaction = glance >>= maybe (yield >> glance >>= maybe (STM.atomically transaction) pure) pure
 
 -- | A wait that nothing can interrupt; for the end of threads that were asked to stop.
 -- GHC's deadlock detector is not heeded: it takes a thread that waits for a cleanup which

@@ -88,23 +88,23 @@ simulators = unsafePerformIO (newIORef [])
 
 -- | Does the first in reality, and the second in a simulation.
 inSimulation :: IO a -> (Simulator -> IO a) -> IO a
-inSimulation really simulated =
-  readIORef simulators >>= \case
-    [] -> really
-    running -> besides running really simulated
+inSimulation really simulated = simulator >>= maybe really simulated
 {-# INLINE inSimulation #-}
-
--- | The same, while simulations run. (Not inlined: the way past it is to be short.)
-besides :: [(Int, Simulator)] -> IO a -> (Simulator -> IO a) -> IO a
-besides running really simulated = myThreadId >>= \self -> whose self running
- where
-  whose _ [] = really
-  whose self ((_, s) : others) = hasTurn s self >>= \mine -> if mine then simulated s else whose self others
-{-# NOINLINE besides #-}
 
 -- | The simulation that the calling thread is part of.
 simulator :: IO (Maybe Simulator)
-simulator = inSimulation (pure Nothing) (pure . Just)
+simulator =
+  readIORef simulators >>= \case
+    [] -> pure Nothing
+    running -> myThreadId >>= whose running
+{-# INLINE simulator #-}
+
+-- | The simulation in which this thread has the turn. (Not inlined: what is done while no
+-- simulation runs is to be short, and to allocate nothing.)
+whose :: [(Int, Simulator)] -> ThreadId -> IO (Maybe Simulator)
+whose [] _ = pure Nothing
+whose ((_, s) : others) self = hasTurn s self >>= \mine -> if mine then pure (Just s) else whose others self
+{-# NOINLINE whose #-}
 
 -- | Lets a simulation (each has a number of its own) take over its threads'
 -- operations while the action runs.
