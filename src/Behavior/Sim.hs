@@ -99,8 +99,8 @@ module Behavior.Sim
   , Counterexample (..)
   ) where
 
-import Behavior.Internal.Seam (Label (..))
 import Behavior.Internal.Sim.Explore
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Simulator (Label (..))

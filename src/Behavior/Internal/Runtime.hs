@@ -65,6 +65,7 @@ import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 
 import Behavior.Internal.Counter
 import Behavior.Internal.Seam
+import Behavior.Internal.Simulator
 
 -- | A thread that the library has started, and how it ends.
 data Thread a = Thread

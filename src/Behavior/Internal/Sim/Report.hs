@@ -13,8 +13,8 @@ import Control.Exception (SomeException (..), displayException)
 import Data.List (groupBy, intercalate)
 import Numeric (showFFloat)
 
-import Behavior.Internal.Seam (Label, Seconds (..))
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Simulator (Label, Seconds (..))
 
 -- $setup
 -- >>> import Behavior

@@ -26,10 +26,10 @@ import qualified Data.IntMap.Strict as IntMap
 import Data.Maybe (isJust)
 import Foreign.StablePtr (newStablePtr)
 
-import Behavior.Internal.Seam
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Simulator
 
 -- | What the seam calls.
 simulation :: Sim -> Simulator

@@ -16,6 +16,7 @@ import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
 import Behavior.Internal.Seam
+import Behavior.Internal.Simulator
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
 import Behavior.Internal.Sim.State

@@ -35,9 +35,9 @@ import Data.IORef
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 
-import Behavior.Internal.Seam
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Simulator
 
 -- | A simulation.
 data Sim = Sim

@@ -17,7 +17,7 @@ module Behavior.Internal.Sim.Types
 
 import Control.Exception (SomeException)
 
-import Behavior.Internal.Seam (Label, Seconds)
+import Behavior.Internal.Simulator (Label, Seconds)
 
 -- | How to simulate.
 --

@@ -1,0 +1,69 @@
+{-# LANGUAGE GeneralizedNewtypeDeriving #-}
+{-# LANGUAGE RankNTypes #-}
+
+-- |
+-- What the two sides of the seam speak of, and what a simulation does for its threads.
+module Behavior.Internal.Simulator
+  ( Label (..)
+  , Seconds (..)
+  , Event (..)
+  , Simulator (..)
+  ) where
+
+import Control.Concurrent (ThreadId)
+import Control.Concurrent.STM (STM)
+import Control.Exception (SomeException)
+import Numeric (showFFloat)
+
+-- | Who started a thread, and what runs in it: @Label "monitor" "task"@.
+data Label = Label
+  { labelOperator :: String
+  , labelBranch :: String
+  }
+  deriving (Eq, Ord)
+
+instance Show Label where
+  show (Label operator "") = operator
+  show (Label operator branch) = operator ++ ": " ++ branch
+
+-- | A length of time, or a moment on the clock of 'Behavior.Time.now', in seconds.
+-- Write it as a literal: @sleep 0.5@; turn other numbers into it with 'realToFrac'.
+--
+-- @since 0.1.0.0
+newtype Seconds = Seconds Double
+  deriving (Eq, Ord, Num, Fractional, Real, RealFrac)
+
+instance Show Seconds where
+  -- 0.05, and not 5.0e-2
+  showsPrec precedence (Seconds s) = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
+
+instance Read Seconds where
+  readsPrec precedence input = [(Seconds s, rest) | (s, rest) <- readsPrec precedence input]
+
+-- | What can be reported of the life of a behaviour.
+data Event
+  = Started Label
+  | Ended Label
+  | -- | What a behaviour says of itself.
+    Noted String
+  deriving (Eq, Ord, Show)
+
+-- | How a simulation does what its threads ask of the seam.
+data Simulator = Simulator
+  { hasTurn :: ThreadId -> IO Bool
+  -- ^ Whether this is the one thread of the simulation that runs just now.
+  , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO ThreadId
+  -- ^ Starts a thread, masked, and publishes what it gives as it ends. The thread is given
+  -- an action to begin with, in which an early cancellation arrives, and how to unmask.
+  , deliver :: ThreadId -> SomeException -> IO ()
+  -- ^ Throws to a thread and waits until it has heard it.
+  , send :: ThreadId -> SomeException -> IO ()
+  -- ^ Throws to a thread, some time, and does not wait.
+  , transact :: forall a. STM a -> IO a
+  , clock :: IO Seconds
+  , await :: Seconds -> IO ()
+  -- ^ Waits until that moment.
+  , pause :: IO ()
+  -- ^ Lets the others run, and lets a cancellation arrive.
+  , record :: Event -> IO ()
+  }
