@@ -186,26 +186,28 @@ stale = do
   -- Seen from inside: when the reading began that it knows of.
   it "does not count the time between readings" $ do
     source <- Source.open (Signal.polling (1 / 0) (pure ()))
-    atomically (Source.reading source) `shouldReturn` Nothing
+    reading <- Source.reading source
+    atomically reading `shouldReturn` Nothing
     structured $ \scope -> do
       (seen, _) <- startWorkers scope "test" source
       atomically (Source.look seen Source.First)
-      atomically (Source.reading source) `shouldReturn` Nothing
+      atomically reading `shouldReturn` Nothing
       pure (pure ())
 
   it "does not count the time of a recovery, when it was stopped in the middle of a reading" $ do
     entered <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> hang)
     source <- Source.open (sensing level)
+    reading <- Source.reading source
     structured $ \scope -> do
       (_, workers) <- startWorkers scope "test" source
       pass entered
-      began <- atomically (Source.reading source)
+      began <- atomically reading
       began `shouldSatisfy` isJust
       ask (map SomeBranch workers)
       for_ workers (atomically . outcome)
       _ <- startWorkers scope "test" source
-      atomically (Source.reading source) >>= (`shouldSatisfy` (/= began))
+      atomically reading >>= (`shouldSatisfy` (/= began))
       pure (pure ())
 
   it "never fails a signal that is not polled" $ do

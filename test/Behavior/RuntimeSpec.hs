@@ -108,7 +108,7 @@ interrupting = do
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread ())
     pass inside
-    interruptByMessenger (threadId thread) (Cancel "thread")
+    interruptByMessengers [(threadId thread, Cancel "thread")]
     open mayEnd
     end <- atomically (threadEnd thread)
     endingOf end `shouldBe` CancelledBy (show (Cancel "thread"))
@@ -117,7 +117,7 @@ interrupting = do
     thread <- mask_ (start label (pure 'a'))
     awaitOver (threadId thread)
     interrupt (threadId thread) (Cancel "thread")
-    interruptByMessenger (threadId thread) (Cancel "thread")
+    interruptByMessengers [(threadId thread, Cancel "thread")]
     end <- atomically (threadEnd thread)
     endingOf end `shouldBe` Gave 'a'
 
@@ -253,8 +253,8 @@ scopes = do
     structured $ \scope -> do
       well <- branch scope label (pure 'a')
       badly <- branch scope label (failed :: IO Char)
-      atomically (completed well) >>= (`shouldBe` 'a')
-      atomically (uncompleted badly) >>= (`shouldBe` FailedWith (show Failed)) . (endingOf :: Either SomeException () -> Ending ()) . Left
+      (settle =<< ended well) `shouldReturn` 'a'
+      atomically (leftmostWrong [well, badly]) >>= (`shouldBe` FailedWith (show Failed)) . (endingOf :: Either SomeException () -> Ending ()) . Left
       (settle =<< atomically (outcome well)) `shouldReturn` 'a'
       (settle =<< atomically (outcome badly)) `shouldThrow` (== Failed)
       pure (pure ())

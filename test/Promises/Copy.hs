@@ -180,13 +180,13 @@ timeoutWith flaw seconds act
       me <- myThreadId
       structured flaw "timeout" $ \scope -> do
         running <- branch scope "branch" act
-        _ <- branch scope "clock" (sleep seconds >> interruptByMessenger me (Stop me))
+        _ <- branch scope "clock" (sleep seconds >> interruptByMessengers [(me, Stop me)])
         (settle <$> atomically (outcomeOf running)) `catch` \e ->
           if isCancellation e then pure (throwIO (TimedOut seconds)) else throwIO e
   | otherwise = do
       over <- newTVarIO False
       let clock = sleep seconds >> atomically (writeTVar over True)
-          elapsed = Signal (pure (pure ()) {workers = [Worker "clock" (pure (const clock))], view = pure (View (\_ -> readTVar over))})
+          elapsed = Signal (pure (viewing (pure (View (\_ -> readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
       react flaw "timeout" elapsed (\up -> if up then Conclude (throwIO (TimedOut seconds)) else Run "branch" act)
 
 -- * Sensors
@@ -217,4 +217,4 @@ pollingWith flaw every act = Signal $ do
           readTVar newest >>= \case
             Just (k, read') | k > before -> either throwSTM pure read'
             _ -> retry
-  pure (pure ()) {workers = [Worker "polling" prepared], view = seen}
+  pure (viewing seen) {workers = [Worker "polling" prepared]}

@@ -50,7 +50,7 @@ import Behavior.Internal.Runtime
   , Thread (threadId)
   , atomically
   , checkpoint
-  , interruptByMessenger
+  , interruptByMessengers
   , start
   , threadEnd
   )
@@ -121,7 +121,7 @@ calling stage change deeds act = do
   for_ deeds $ \(after, deed) -> do
     pause stage after
     case deed of
-      CancelsIt -> interruptByMessenger (threadId caller) (Cancel "the caller")
+      CancelsIt -> interruptByMessengers [(threadId caller, Cancel "the caller")]
       Changes world -> change world
   endingOf <$> atomically (threadEnd caller)
 

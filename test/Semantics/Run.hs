@@ -128,7 +128,7 @@ behavior tell world = do
     Operator -> firstOf [played, timeIsUp <$ environment stage]
     Stranger later -> do
       thread <- mask_ (start (Sim.Label "stranger" "") played)
-      let interrupting = interruptByMessenger (threadId thread) Enough
+      let interrupting = interruptByMessengers [(threadId thread, Enough)]
       environment stage
       interrupting
       sleepUntil (fromIntegral (patience world + later))

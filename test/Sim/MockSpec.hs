@@ -10,7 +10,7 @@ import System.IO.Error (isUserError)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..), Thread (threadId), interruptByMessenger, start, threadEnd)
+import Behavior.Internal.Runtime (Label (..), Thread (threadId), interruptByMessengers, start, threadEnd)
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Options (..), Outcome (..), Run (..), Schedule (..), defaults, simulate, simulateWith)
@@ -161,7 +161,7 @@ stopped = do
       act <- action mock "act" [script]
       _ <- simulate $ do
         thread <- mask_ (start (Label "test" "act") act)
-        replicateM_ 3 $ sleep 1 >> interruptByMessenger (threadId thread) (Cancel "again")
+        replicateM_ 3 $ sleep 1 >> interruptByMessengers [(threadId thread, Cancel "again")]
         atomically (threadEnd thread)
       map (\e -> (happenedAt e, happening e)) . entries <$> happened mock
         `shouldReturn` [(0, Begins), (1, AskedToStop), (t, end)]

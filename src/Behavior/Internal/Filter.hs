@@ -58,6 +58,7 @@ debounce seconds signal = Signal $ do
                ]
       , -- The look at the source itself is for what it throws.
         view = looking (*> (readTVar settled >>= maybe retry pure)) <$> view source
+      , alike = \_ -> alike source (==)
       }
 
 -- | @hysteresis low high signal@ becomes true when the signal reaches @high@, and
@@ -96,6 +97,7 @@ hysteresis low high signal = Signal $ do
     source
       { workers = workers source ++ [Worker "hysteresis" (const . remembering . quietly <$> view source)]
       , view = looking state <$> view source
+      , alike = \_ -> alike source (==)
       }
 
 -- | A look for those who wait for values only: what it throws is for the operator,

@@ -19,10 +19,10 @@ module Behavior.Internal.Parallel
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (ErrorCall (..), finally, onException, throwIO)
-import Control.Monad (filterM, void)
+import Control.Exception (ErrorCall (..), SomeException, finally, throwIO)
+import Control.Monad (filterM, void, (<=<))
 import Data.Foldable (asum, toList)
-import Data.Maybe (listToMaybe)
+import Data.Maybe (isJust, listToMaybe)
 import Data.Traversable (for, mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, failed)
@@ -131,29 +131,39 @@ numbered operator = mapAccumL (\n act -> (n + 1, (Label operator (show n), act))
 race :: [(Label, Behavior a)] -> Behavior a
 race behaviors = structured $ \scope -> do
   branches <- traverse (uncurry (branch scope)) behaviors
-  settle <$> atomicallyUnless (leftmost branches) (asum (outcome <$> branches))
+  settle <$> atomicallyUnless (leftNow branches) (leftmost branches)
  where
   -- Only the left one: of the others it could not be said that the left one had not
   -- ended before.
-  leftmost = maybe (pure Nothing) outcomeNow . listToMaybe
+  leftNow = maybe (pure Nothing) outcomeNow . listToMaybe
 
 gather :: Traversable t => t (Label, Behavior a) -> Behavior (t a)
 gather behaviors = structured $ \scope -> do
   -- One variable tells of trouble anywhere, so that waiting for n branches takes
   -- n looks at two variables, and not n looks at n.
   trouble <- newTVarIO False
-  branches <- for behaviors $ \(label, act) -> branch scope label (act `alarming` trouble)
-  let waiting [] = pure (traverse (\b -> atomicallyUnless (completedNow b) (completed b)) branches)
+  branches <- traverse (uncurry (branchThen (troubling trouble) scope)) behaviors
+  let -- From left to right, at a glance.
+      verdictNow = foldr glance (pure (Just results)) branches
+      glance b others =
+        outcomeNow b >>= \case
+          Nothing -> pure Nothing
+          Just end -> either (pure . Just . throwIO) (const others) (result end)
+      waiting [] = pure results
       waiting (b : bs) = do
         quiet <-
           atomicallyUnless ((True <$) <$> completedNow b) $
-            (True <$ completed b) `orElse` (False <$ (readTVar trouble >>= check))
-        if quiet then waiting bs else throwIO <$> atomically (asum (uncompleted <$> branches))
-  waiting (toList branches)
+            outcomeSoFar b >>= \case
+              Just (Completed _) -> pure True
+              _ -> False <$ (readTVar trouble >>= check)
+        if quiet then waiting bs else throwIO <$> atomically (leftmostWrong (toList branches))
+      -- (When all have completed.)
+      results = traverse (settle <=< ended) branches
+  atomicallyUnless (fmap Just <$> verdictNow) (pure Nothing) >>= maybe (waiting (toList branches)) pure
 
--- | Raises the alarm if the behaviour throws.
-alarming :: Behavior a -> TVar Bool -> Behavior a
-alarming act trouble = act `onException` atomically (writeTVar trouble True)
+-- | Tells of trouble if a branch threw.
+troubling :: TVar Bool -> Either SomeException a -> STM ()
+troubling trouble = either (\_ -> writeTVar trouble True) (\_ -> pure ())
 
 -- | A place where behaviours run beside a 'scoped' one.
 --
@@ -202,27 +212,30 @@ scoped body = do
   serving requests scope = do
     trouble <- newTVarIO False
     main <- branch scope (Label "scoped" "body") (body (Nursery requests))
-    let -- The children that live, or died of something, the newest first.
-        serve children = do
+    let -- The children that live, or died of something, the newest first; and at how many
+        -- to look next for those that are no more.
+        serve limit children = do
           next <- atomically (asum [Left . settle <$> outcome main, Left <$> alarm, Right <$> arrived])
           case next of
             Left verdict -> pure verdict
             Right new -> do
               forked <- for new $ \(Request act accepted) ->
-                branch scope (Label "scoped" "fork") (act `alarming` trouble)
+                branchThen (troubling trouble) scope (Label "scoped" "fork") act
                   <* atomically (putTMVar accepted ())
-              living <- filterM alive children
-              serve (reverse forked ++ living)
+              let family = reverse forked ++ children
+              if length family < limit
+                then serve limit family
+                else filterM alive family >>= \living -> serve (max 16 (2 * length living)) living
          where
-          alarm = readTVar trouble >>= check >> throwIO <$> asum (uncompleted <$> reverse children)
+          alarm = readTVar trouble >>= check >> throwIO <$> leftmostWrong (reverse children)
         arrived =
           readTVar requests >>= \case
             Open new@(_ : _) -> reverse new <$ writeTVar requests (Open [])
             _ -> retry
         alive child = do
-          over <- atomically ((True <$ completed child) `orElse` pure False)
+          over <- isJust <$> completedNow child
           if over then False <$ forget scope child else pure True
-    serve []
+    serve 16 []
 
 -- | Starts a behaviour that runs until it ends by itself, or 'scoped' ends. The
 -- transaction that it returns waits for the result.

@@ -20,10 +20,9 @@ module Behavior.Internal.Reactive
   , whileHolding
   ) where
 
-import Control.Concurrent.STM (STM, check, orElse)
+import Control.Concurrent.STM (STM, check)
 import Control.Exception (SomeException, throwIO)
 import Control.Monad (join)
-import Data.Foldable (asum)
 import Data.List (findIndex)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
@@ -52,6 +51,7 @@ data Reaction a
 react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react operator signal reaction = structured $ \scope -> do
   source <- open signal
+  alike source (==)
   let begin moment = do
         (seen, sensors) <- startWorkers scope operator source
         choose sensors seen moment
@@ -75,8 +75,8 @@ react operator signal reaction = structured $ \scope -> do
             -- interrupted, whatever the signal says in the same transaction.
             event <-
               observeUnless (fmap Left <$> outcomeNow running) $
-                (Right . Left <$> outcome running)
-                  `orElse` (fmap Right <$> attend sensors (changed value old))
+                outcomeSoFar running
+                  >>= maybe (fmap Right <$> attend sensors (changed value old)) (pure . Right . Left)
             case event of
               Right (Left end) -> pure (settle end)
               Right (Right new) -> interrupt sensors running (reaction new)
@@ -128,7 +128,7 @@ react operator signal reaction = structured $ \scope -> do
 
 -- | Looks at a value, and first at the sensors that it comes from.
 attend :: [Branch ()] -> STM a -> STM (Either SomeException a)
-attend sensors value = (Left <$> asum (map lost sensors)) `orElse` (Right <$> value)
+attend sensors value = foldr (\sensor others -> lost sensor >>= maybe others (pure . Left)) (Right <$> value) sensors
 
 -- | Waits for a transaction; what it throws is a sensor's.
 observe :: STM (Either SomeException a) -> IO (Either SomeException a)

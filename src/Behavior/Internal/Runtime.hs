@@ -1,4 +1,5 @@
 {-# LANGUAGE CPP #-}
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE RankNTypes #-}
 
 -- |
@@ -13,10 +14,12 @@ module Behavior.Internal.Runtime
     Label (..)
   , Thread (threadId)
   , threadEnd
-  , threadEnded
+  , threadEndSoFar
+  , threadEndNow
   , start
+  , startThen
   , interrupt
-  , interruptByMessenger
+  , interruptByMessengers
   , living
 
     -- * Waiting
@@ -24,12 +27,15 @@ module Behavior.Internal.Runtime
   , firmly
   , atomicallyUnless
   , checkpoint
+  , giveWay
 
     -- * Time
   , Seconds (..)
   , now
   , sleep
   , sleepUntil
+  , sleepBetween
+  , sleepToSlot
   , duration
   , period
 
@@ -39,7 +45,7 @@ module Behavior.Internal.Runtime
   , reportingTo
   ) where
 
-import Control.Concurrent (ThreadId, forkIO, forkIOWithUnmask, myThreadId, threadDelay, throwTo, yield)
+import Control.Concurrent (ThreadId, forkIO, forkIOWithUnmask, myThreadId, throwTo, yield)
 import Control.Concurrent.STM (STM, TVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
@@ -54,7 +60,7 @@ import Control.Exception
   )
 import Control.Monad (when)
 import Data.Foldable (for_)
-import Data.IORef (IORef, newIORef, readIORef, writeIORef)
+import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
 import GHC.Clock (getMonotonicTime)
 import GHC.Conc (labelThread)
 import System.IO.Unsafe (unsafePerformIO)
@@ -63,6 +69,7 @@ import System.IO.Unsafe (unsafePerformIO)
 import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 #endif
 
+import qualified Behavior.Internal.Alarm as Alarm
 import Behavior.Internal.Counter
 import Behavior.Internal.Seam
 import Behavior.Internal.Simulator
@@ -74,39 +81,49 @@ data Thread a = Thread
   -- ^ Nothing until it has ended, cleanup included.
   }
 
--- | Waits until the thread has ended.
+-- | How the thread ends; retries until it has.
 threadEnd :: Thread a -> STM (Either SomeException a)
-threadEnd thread = STM.readTVar (threadResult thread) >>= maybe STM.retry pure
+threadEnd thread = threadEndSoFar thread >>= maybe STM.retry pure
 
 -- | How the thread has ended, if it has.
-threadEnded :: Thread a -> IO (Maybe (Either SomeException a))
-threadEnded = STM.readTVarIO . threadResult
+threadEndSoFar :: Thread a -> STM (Maybe (Either SomeException a))
+threadEndSoFar = STM.readTVar . threadResult
+
+-- | The same, at a glance.
+threadEndNow :: Thread a -> IO (Maybe (Either SomeException a))
+threadEndNow = STM.readTVarIO . threadResult
 
 -- | Starts a thread in which the action runs unmasked, whatever the caller's
 -- masking state. Call it masked, or the thread may be lost before it is returned.
---
--- (What is inlined here, and what is not, is so that the switch costs nothing.)
 start :: Label -> IO a -> IO (Thread a)
-start label act = inSimulation (startReally label act) (startSimulated label act)
+start = startThen (\_ -> pure ())
 {-# INLINE start #-}
 
-startReally :: Label -> IO a -> IO (Thread a)
-startReally label act = do
+-- | The same; as it is known how the thread has ended, the given is done in the same
+-- transaction.
+--
+-- (What is inlined here, and what is not, is so that the switch costs nothing.)
+startThen :: (Either SomeException a -> STM ()) -> Label -> IO a -> IO (Thread a)
+startThen then' label act = inSimulation (startReally then' label act) (startSimulated then' label act)
+{-# INLINE startThen #-}
+
+startReally :: (Either SomeException a -> STM ()) -> Label -> IO a -> IO (Thread a)
+startReally then' label act = do
   result <- STM.newTVarIO Nothing
   add livingCount 1
   -- Forked masked: an exception cannot strike before 'try' is in place, nor
   -- between the end of the action and the publication of how it ended.
   thread <- forkIOWithUnmask $ \unmask -> do
     end <- life tell label act (pure ()) unmask
-    STM.atomically (STM.writeTVar result (Just end))
+    STM.atomically (STM.writeTVar result (Just end) >> then' end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
 
-startSimulated :: Label -> IO a -> Simulator -> IO (Thread a)
-startSimulated label act simulation = do
+startSimulated :: (Either SomeException a -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread a)
+startSimulated then' label act simulation = do
   result <- STM.newTVarIO Nothing
   let report event = tell event >> record simulation event
-  thread <- spawn simulation label (life report label act) (STM.writeTVar result . Just)
+  thread <- spawn simulation label (life report label act) (\end -> STM.writeTVar result (Just end) >> then' end)
   add livingCount 1
   pure (Thread thread result)
 {-# NOINLINE startSimulated #-}
@@ -148,14 +165,28 @@ interrupt :: Exception e => ThreadId -> e -> IO ()
 interrupt thread e =
   inSimulation (throwTo thread e) (\simulation -> deliver simulation thread (toException e))
 
--- | 'interrupt' by a messenger of its own, which does the waiting.
-interruptByMessenger :: Exception e => ThreadId -> e -> IO ()
-interruptByMessenger thread e =
-  inSimulation byMessenger (\simulation -> send simulation thread (toException e))
+-- | 'interrupt' by messengers, who do the waiting: none of the threads hears it later
+-- because another is slow to hear.
+--
+-- One messenger does all the errands, until it has to wait. Then there is another for those
+-- that are left.
+interruptByMessengers :: Exception e => [(ThreadId, e)] -> IO ()
+interruptByMessengers errands =
+  inSimulation byMessenger $ \simulation -> for_ errands $ \(thread, e) -> send simulation thread (toException e)
  where
-  byMessenger = do
-    messenger <- forkIO (uninterruptibleMask_ (interrupt thread e))
-    labelThread messenger (show (Label "interrupt" "messenger"))
+  byMessenger = newIORef errands >>= hire
+  hire left =
+    readIORef left >>= \case
+      [] -> pure ()
+      _ -> do
+        messenger <- forkIO (uninterruptibleMask_ (carry left))
+        when labelling $ labelThread messenger (show (Label "interrupt" "messenger"))
+        yield
+        hire left
+  carry left =
+    atomicModifyIORef' left (\these -> (drop 1 these, take 1 these)) >>= \case
+      [] -> pure ()
+      these -> for_ these (uncurry throwTo) >> carry left
 
 -- | How many threads started by 'start' have not ended.
 living :: IO Int
@@ -190,7 +221,7 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
 -- meanwhile: it should look at one variable only. (In a simulation there is no glance.)
 atomicallyUnless :: IO (Maybe a) -> STM a -> IO a
 atomicallyUnless glance transaction =
-  inSimulation (reallyUnless glance transaction) (\simulation -> transact simulation transaction)
+  inSimulation (reallyUnless glance transaction) (`transact` transaction)
 
 reallyUnless :: IO (Maybe a) -> STM a -> IO a
 reallyUnless glance transaction = glance >>= maybe (yield >> glance >>= maybe (STM.atomically transaction) pure) pure
@@ -215,6 +246,11 @@ firmly waiting = uninterruptibleMask_ again
 -- @since 0.1.0.0
 checkpoint :: IO ()
 checkpoint = inSimulation (pure ()) pause
+
+-- | Lets those run who were just started, or just asked for something: what they do at
+-- once need not be waited for. (In a simulation the schedule says who runs.)
+giveWay :: IO ()
+giveWay = inSimulation yield (const (pure ()))
 
 -- | The time, in seconds since some fixed moment of this run of the program. It
 -- never goes backwards, and is not the time of day.
@@ -246,15 +282,17 @@ sleep seconds = do
 
 -- | Sleeps until the clock shows the given moment, or a later one.
 sleepUntil :: Seconds -> IO ()
-sleepUntil moment = inSimulation really (`await` moment)
- where
-  really = do
-    t <- now
-    when (moment > t) $ do
-      -- A day at a time: the longest delay that 'threadDelay' can count is shorter
-      -- than the longest that can be asked for.
-      threadDelay (ceiling (min 86400 (moment - t) * 1000000))
-      really
+sleepUntil moment = now >>= \t -> sleepBetween t moment
+
+-- | Sleeps until the second moment. The first is what the clock shows now.
+sleepBetween :: Seconds -> Seconds -> IO ()
+sleepBetween (Seconds t) moment@(Seconds time) = inSimulation (Alarm.sleepBetween t time) (`await` moment)
+
+-- | Sleeps until a slot of so many seconds begins, and says when that is (in reality perhaps
+-- a little later than asked for: see 'Alarm.sleepToSlot'). The second moment is now.
+sleepToSlot :: Seconds -> Seconds -> Seconds -> IO Seconds
+sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time) =
+  inSimulation (Seconds <$> Alarm.sleepToSlot every t time) (\simulation -> slot <$ await simulation slot)
 
 -- | Refuses what is no duration: a negative number, or NaN.
 duration :: String -> Seconds -> IO Seconds

@@ -20,10 +20,14 @@ module Behavior.Internal.Scope
     -- * Branches
   , Branch
   , outcome
+  , outcomeSoFar
   , outcomeNow
+  , leftmost
+  , leftmostWrong
   , ended
   , SomeBranch (..)
   , branch
+  , branchThen
   , worker
   , forget
   , ask
@@ -31,9 +35,7 @@ module Behavior.Internal.Scope
 
     -- * How a branch ends
   , Outcome (..)
-  , completed
   , completedNow
-  , uncompleted
   , settle
   , result
   , StoppedWithFault (..)
@@ -54,7 +56,7 @@ import Control.Exception
   , uninterruptibleMask_
   )
 import Control.Monad (filterM)
-import Data.Foldable (traverse_)
+import Data.Foldable (for_)
 import Data.IORef (IORef, atomicModifyIORef', modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
@@ -76,6 +78,15 @@ data Branch a = Branch
 -- | How the branch ended; retries until it has.
 outcome :: Branch a -> STM (Outcome a)
 outcome b = ending b <$> threadEnd (branchThread b)
+
+-- | How the branch ended, if it has. (To ask several branches so, one after the other, is
+-- the same as 'orElse' between their outcomes, without its nested transactions.)
+outcomeSoFar :: Branch a -> STM (Maybe (Outcome a))
+outcomeSoFar b = fmap (ending b) <$> threadEndSoFar (branchThread b)
+
+-- | How the leftmost branch ended that has ended; retries until one has.
+leftmost :: [Branch a] -> STM (Outcome a)
+leftmost = foldr (\b others -> outcomeSoFar b >>= maybe others pure) retry
 
 branchId :: Branch a -> ThreadId
 branchId = threadId . branchThread
@@ -118,22 +129,31 @@ end (Scope branches) = do
   started <- reverse <$> readIORef branches
   -- Nothing may interrupt this, or the rest would be orphaned.
   uninterruptibleMask_ (ask started)
-  concat <$> traverse (\(SomeBranch b) -> faults <$> firmly (ended b)) started
+  concat <$> traverse (\(SomeBranch b) -> faults <$> endedFirmly b) started
  where
+  endedFirmly b = outcomeNow b >>= maybe (firmly (ended b)) pure
   faults = \case
     Faulted e -> [e]
     _ -> []
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
-branch scope label act = worker scope label (const act)
+branch = branchThen (\_ -> pure ())
+
+-- | The same; as it is known how the branch has ended, the given is done in the same
+-- transaction. (It is told that it completed, or what it threw.)
+branchThen :: (Either SomeException a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
+branchThen then' scope label act = launch scope (\_ -> startThen then' label act)
 
 -- | Starts a branch that can see whether it was asked to stop. One that runs a
 -- user's action in a loop must look: the action may have swallowed the request.
 worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-worker (Scope branches) label act = mask_ $ do
+worker scope label act = launch scope (start label . act)
+
+launch :: Scope -> (IO Bool -> IO (Thread a)) -> IO (Branch a)
+launch (Scope branches) starting = mask_ $ do
   asked <- newIORef False
-  thread <- start label (act (readIORef asked))
+  thread <- starting (readIORef asked)
   let new = Branch {branchThread = thread, branchAsked = asked}
   modifyIORef' branches (SomeBranch new :)
   pure new
@@ -155,18 +175,21 @@ forget (Scope branches) old = modifyIORef' branches without
 -- Whoever waits for that can be interrupted, if it lets itself be. Then that last one
 -- counts as not asked.
 ask :: [SomeBranch] -> IO ()
-ask branches = mask_ (filterM marked branches >>= go)
+ask branches = mask_ $ do
+  toAsk <- filterM marked branches
+  for_ (unsnoc toAsk) $ \(others, SomeBranch b) -> do
+    askByMessengers others
+    interrupt (branchId b) (stopping b) `onException` writeIORef (branchAsked b) False
  where
-  go [] = pure ()
-  go [SomeBranch b] = interrupt (branchId b) (stopping b) `onException` writeIORef (branchAsked b) False
-  go (b : bs) = askByMessenger b >> go bs
+  unsnoc [] = Nothing
+  unsnoc bs = Just (init bs, last bs)
 
 -- | Asks branches to stop, all at once, and does not wait for any to hear it.
 askWithoutWaiting :: [SomeBranch] -> IO ()
-askWithoutWaiting branches = mask_ (filterM marked branches >>= traverse_ askByMessenger)
+askWithoutWaiting branches = mask_ (filterM marked branches >>= askByMessengers)
 
-askByMessenger :: SomeBranch -> IO ()
-askByMessenger (SomeBranch b) = interruptByMessenger (branchId b) (stopping b)
+askByMessengers :: [SomeBranch] -> IO ()
+askByMessengers branches = interruptByMessengers [(branchId b, stopping b) | SomeBranch b <- branches]
 
 stopping :: Branch a -> Stop
 stopping = Stop . branchId
@@ -174,28 +197,25 @@ stopping = Stop . branchId
 -- | Marks a branch as asked. False if it was asked before, or has ended.
 marked :: SomeBranch -> IO Bool
 marked (SomeBranch b) = do
-  hasEnded <- isJust <$> threadEnded (branchThread b)
+  hasEnded <- isJust <$> threadEndNow (branchThread b)
   if hasEnded then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
 
 -- | Waits for the end of the branch.
 ended :: Branch a -> IO (Outcome a)
 ended b = atomicallyUnless (outcomeNow b) (outcome b)
 
--- | How the branch has ended, if it has.
+-- | How the branch has ended, if it has, at a glance.
 outcomeNow :: Branch a -> IO (Maybe (Outcome a))
-outcomeNow b = fmap (ending b) <$> threadEnded (branchThread b)
+outcomeNow b = fmap (ending b) <$> threadEndNow (branchThread b)
 
 -- | What the branch has returned, if it has.
 completedNow :: Branch a -> IO (Maybe a)
 completedNow b = (>>= either (const Nothing) Just . result) <$> outcomeNow b
 
--- | Waits until the branch has completed.
-completed :: Branch a -> STM a
-completed b = outcome b >>= either (const retry) pure . result
-
--- | Waits until the branch has ended in any other way.
-uncompleted :: Branch a -> STM SomeException
-uncompleted b = outcome b >>= either pure (const retry) . result
+-- | What the leftmost branch threw that has ended and has not completed; retries until one
+-- has.
+leftmostWrong :: [Branch a] -> STM SomeException
+leftmostWrong = foldr (\b others -> outcomeSoFar b >>= maybe others (either pure (const others) . result)) retry
 
 -- | The action that an outcome stands for.
 settle :: Outcome a -> IO a

@@ -8,8 +8,9 @@ module Behavior.Internal.Sensor
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (throwIO)
+import Control.Exception (evaluate, throwIO)
 import Control.Monad (forever, when)
+import Data.IORef (newIORef, readIORef, writeIORef)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
 import Behavior.Internal.Runtime
@@ -39,18 +40,18 @@ import Behavior.Internal.Source
 polling :: Seconds -> Behavior a -> Signal a
 polling every act = Signal $ do
   _ <- period "polling" every
-  nextSlot <- newTVarIO Nothing -- no reading starts before it
-  started <- newTVarIO (0 :: Int) -- how many readings were started
-  newest <- newTVarIO Nothing -- the newest finished reading, and its number
-  underWay <- newTVarIO Nothing
-  let readAt slot asked = do
-        sleepUntil slot
-        begun <- now
-        number <- atomically $ do
-          writeTVar underWay (Just begun)
-          modifyTVar' started (+ 1)
-          writeTVar nextSlot (Just (begun + every))
-          readTVar started
+  views <- newTVarIO (0 :: Int) -- how many were asked for
+  newest <- newTVarIO Nothing -- the reading last told, and how many views there were when it began
+  begun <- newIORef Nothing -- the slot of the last reading that has begun
+  underWay <- newTVarIO Nothing -- the slot of the reading that is under way
+  telling <- newIORef False -- whether somebody wants to know of that
+  same <- newIORef (\_ _ -> False)
+  let readFrom t planned told asked = do
+        slot <- sleepToSlot every t planned
+        writeIORef begun (Just slot)
+        tells <- readIORef telling
+        when tells $ atomically (writeTVar underWay (Just slot))
+        asking <- readTVarIO views
         read' <- trySynchronous act
         stopping <- asked
         if stopping
@@ -58,28 +59,45 @@ polling every act = Signal $ do
           -- request to stop. A fault of its cleanup is not lost.
             either throwIO (const (pure ())) read'
           else do
-            atomically (writeTVar newest (Just (number, read')) >> writeTVar underWay Nothing)
-            t <- now
-            readAt (slotAfter (begun + every) t) asked
-      slotAfter slot t
-        | slot >= t = slot
-        | otherwise = slot + every * fromInteger (ceiling ((t - slot) / every))
+            isNews <- case (told, read') of
+              -- (Who asked for a view meanwhile wants to hear it, whatever it is.)
+              (Told asking' old, Right new) | asking == asking' -> differs old new
+              _ -> pure True
+            when (isNews || tells) . atomically $ do
+              when isNews (writeTVar newest (Just (asking, read')))
+              when tells (writeTVar underWay Nothing)
+            t' <- now
+            let next = slotAfter (slot + every) t'
+            next `seq` readFrom t' next (if isNews then either (const Untold) (Told asking) read' else told) asked
+      differs old new = do
+        isSame <- readIORef same
+        either (const True) not <$> trySynchronous (evaluate (isSame old new))
+      slotAfter next t
+        | next >= t = next
+        | otherwise = next + every * fromInteger (ceiling ((t - next) / every))
   pure
     Source
       { workers =
           [ Worker "polling" $ do
               writeTVar underWay Nothing
-              slot <- readTVar nextSlot
-              pure $ \asked -> now >>= \t -> readAt (maybe t (max t) slot) asked
+              pure $ \asked -> do
+                t <- now
+                slot <- maybe t (max t . (+ every)) <$> readIORef begun
+                readFrom t slot Untold asked
           ]
       , view = do
-          before <- readTVar started
+          n <- (+ 1) <$> readTVar views
+          writeTVar views n
           pure . View $ \_ ->
             readTVar newest >>= \case
-              Just (number, read') | number > before -> either throwSTM pure read'
+              Just (asking, read') | asking >= n -> either throwSTM pure read'
               _ -> retry
-      , reading = readTVar underWay
+      , reading = writeIORef telling True >> pure (readTVar underWay)
+      , alike = writeIORef same
       }
+
+-- | What was last told of a sensor, and how many views had been asked for when it was read.
+data Told a = Untold | Told !Int a
 
 -- | Fails the operator when a polled reading of the signal takes longer than so
 -- many seconds (more than zero).
@@ -97,18 +115,19 @@ staleAfter :: Seconds -> Signal a -> Signal a
 staleAfter limit signal = Signal $ do
   _ <- period "staleAfter" limit
   source <- open signal
+  current <- reading source
   -- Odd while a reading is overdue, and higher whenever one has been: so a view
   -- also fails for one that is over by the time it looks.
   overdue <- newTVarIO (0 :: Int)
   let watchdog = forever $ do
-        since <- atomically (reading source >>= maybe retry pure)
+        since <- atomically (current >>= maybe retry pure)
         sleepUntil (since + limit)
         isOverdue <- atomically $ do
-          still <- (== Just since) <$> reading source
+          still <- (== Just since) <$> current
           when still (modifyTVar' overdue (+ 1))
           pure still
         when isOverdue . atomically $ do
-          still <- (== Just since) <$> reading source
+          still <- (== Just since) <$> current
           when still retry
           calm
       calm = modifyTVar' overdue (\n -> if odd n then n + 1 else n)

@@ -10,6 +10,7 @@ module Behavior.Internal.Source
 
     -- * Sources
   , Source (..)
+  , viewing
   , View (..)
   , looking
   , Moment (..)
@@ -20,10 +21,12 @@ module Behavior.Internal.Source
   , lost
   ) where
 
+import Control.Applicative (liftA2)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally)
-import Control.Monad (when)
-import Data.Foldable (for_)
+import Control.Monad (unless, when)
+import Data.Foldable (for_, traverse_)
+import Data.Function (on)
 import Data.Traversable (for)
 
 import Behavior.Internal.Failure (Behavior, failWith)
@@ -63,20 +66,27 @@ data Source a = Source
   -- ^ What must run while the source is looked at.
   , view :: STM (View a)
   -- ^ A view of the values that are read from this moment on.
-  , reading :: STM (Maybe Seconds)
-  -- ^ When the oldest reading began that is under way.
+  , reading :: IO (STM (Maybe Seconds))
+  -- ^ Asks to be told when the oldest reading began that is under way; before any worker
+  -- is started.
+  , alike :: (a -> a -> Bool) -> IO ()
+  -- ^ Says which values are alike to all who look: then nobody need hear of a reading
+  -- that is like the last one.
   }
 
+-- | The source that gives this view, and all by itself.
+viewing :: STM (View a) -> Source a
+viewing it = Source {workers = [], view = it, reading = pure (pure Nothing), alike = \_ -> pure ()}
+
 instance Functor Source where
-  fmap f source = source {view = fmap f <$> view source}
+  fmap f source = source {view = fmap f <$> view source, alike = \same -> alike source (same `on` f)}
 
 instance Applicative Source where
-  pure a = Source {workers = [], view = pure (pure a), reading = pure Nothing}
+  pure = viewing . pure . pure
   f <*> a =
-    Source
+    (viewing ((<*>) <$> view f <*> view a))
       { workers = workers f ++ workers a
-      , view = (<*>) <$> view f <*> view a
-      , reading = earliest <$> reading f <*> reading a
+      , reading = liftA2 (liftA2 earliest) (reading f) (reading a)
       }
    where
     earliest (Just s) (Just t) = Just (min s t)
@@ -126,7 +136,7 @@ data Worker = Worker
 --
 -- @since 0.1.0.0
 watching :: STM a -> Signal a
-watching transaction = Signal . pure $ (pure ()) {view = pure (View value)}
+watching transaction = Signal . pure . viewing . pure $ View value
  where
   value First = transaction
   value Later = transaction `orElse` failWith "the signal has no value any more"
@@ -156,14 +166,15 @@ withShared signal body = do
  where
   sharing closed scope = do
     source <- open signal
+    underWay <- reading source -- Somebody may ask later.
     others <- newEmptyTMVarIO
     let shared = Signal $ do
           atomically stillOpen
           running <- atomically (readTMVar others)
           let attended value = stillOpen >> for_ running unlessLost >> value
-          pure source {workers = [], view = looking attended <$> view source}
+          pure (viewing (looking attended <$> view source)) {reading = pure underWay}
         stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
-        unlessLost sensor = (lost sensor >>= throwSTM) `orElse` pure ()
+        unlessLost sensor = lost sensor >>= traverse_ throwSTM
     -- The body comes first, so that its fault is the leftmost.
     main <- branch scope (Label "withShared" "body") (body shared)
     (_, running) <- startWorkers scope "withShared" source
@@ -179,13 +190,14 @@ startWorkers scope operator source = do
   (works, seen) <- atomically ((,) <$> traverse work (workers source) <*> view source)
   running <- for (zip (workers source) works) $ \(w, run) ->
     worker scope (Label operator (workerName w)) run
+  unless (null running) giveWay
   pure (seen, running)
 
--- | Waits until a worker has died, and says of what. (One that was asked to stop has
--- not.)
-lost :: Branch () -> STM SomeException
-lost sensor =
-  outcome sensor >>= \case
-    Failing e -> pure e
-    Faulted e -> pure e
-    _ -> retry
+-- | What a worker has died of, if it has. (One that was asked to stop has not.)
+lost :: Branch () -> STM (Maybe SomeException)
+lost sensor = (>>= cause) <$> outcomeSoFar sensor
+ where
+  cause = \case
+    Failing e -> Just e
+    Faulted e -> Just e
+    _ -> Nothing

@@ -17,7 +17,7 @@ import Behavior.Internal.Failure
   )
 import Behavior.Internal.Reactive (Reaction (..), react)
 import Behavior.Internal.Runtime (Seconds, atomically, duration, now, sleepUntil)
-import Behavior.Internal.Source (Signal (..), Source (..), View (..), Worker (..))
+import Behavior.Internal.Source (Signal (..), Source (..), View (..), Worker (..), viewing)
 
 -- $setup
 -- >>> import Behavior (sleep, (?))
@@ -68,4 +68,4 @@ elapsed seconds = Signal $ do
   over <- newTVarIO (seconds <= 0)
   deadline <- (+ seconds) <$> now
   let clock = sleepUntil deadline >> atomically (writeTVar over True)
-  pure (pure ()) {workers = [Worker "clock" (pure (const clock))], view = pure (View (\_ -> readTVar over))}
+  pure (viewing (pure (View (\_ -> readTVar over)))) {workers = [Worker "clock" (pure (const clock))]}

@@ -23,7 +23,7 @@ import Data.Maybe (isJust, listToMaybe)
 import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Runtime
-import Behavior.Internal.Source (Moment (..), Signal (..), Source (view, workers), View (..), Worker (..))
+import Behavior.Internal.Source (Moment (..), Signal (..), Source (workers), View (..), Worker (..), viewing)
 import Behavior.Internal.Mock.World
 
 -- $setup
@@ -154,9 +154,8 @@ signal c = Signal $ do
             First -> retry
             Later -> failWith (nameOf c ++ " has no value any more")
   pure
-    (pure ())
+    (viewing (pure (View value)))
       { workers = [Worker "clock" (const wake <$ writeTVar made False) | changesByItself]
-      , view = pure (View value)
       }
 
 -- | The condition as a reading, to be polled: what it is now. It fails when there is no

@@ -1,0 +1,142 @@
+-- |
+-- Waking at a given time, for many sleepers and without a timer for each.
+--
+-- Who sleeps waits at a gate, with all others who want to wake in the same tick; a clock
+-- opens the gates that are due. To lie down and to be woken costs what a lookup and an
+-- 'MVar' cost, and to be interrupted costs nothing: there is nothing to take back.
+--
+-- Who is interrupted leaves a place in the gate's queue until it opens. Therefore nobody
+-- waits at a gate that is farther away than he has slept already, or than a second: the
+-- places that are left are never many more than the sleepers.
+module Behavior.Internal.Alarm
+  ( sleepBetween
+  , sleepToSlot
+  ) where
+
+import Control.Concurrent (forkIO, myThreadId, rtsSupportsBoundThreads, threadDelay, yield)
+import Control.Concurrent.MVar
+import Control.Exception (mask_)
+import Control.Monad (void, when)
+import Data.Foldable (for_, toList, traverse_)
+import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
+import Data.List (delete)
+import Foreign.C (CInt (..), CUInt (..))
+import GHC.Clock (getMonotonicTime)
+import GHC.Conc (labelThread)
+import System.IO.Unsafe (unsafePerformIO)
+
+-- | All that sleeps in this process.
+data Alarms = Alarms
+  { gates :: !(IntMap (MVar ()))
+  -- ^ One for each tick in which somebody wants to wake. It is opened once.
+  , clocks :: ![Tick]
+  -- ^ When the clocks go off, the earliest first. One that is set is never stopped: when
+  -- somebody wants to wake earlier, another is set.
+  }
+
+alarms :: IORef Alarms
+alarms = unsafePerformIO (newIORef (Alarms IntMap.empty []))
+{-# NOINLINE alarms #-}
+
+-- | Sleeps from now, as 'getMonotonicTime' tells it, until it tells the second time or a
+-- later one.
+sleepBetween :: Double -> Double -> IO ()
+sleepBetween from to = when (to > from) $ sleepTicks (tick floor from) (endOf from to)
+
+-- | Sleeps from now until the beginning of a slot, for who does that in every period, and
+-- gives the time of it. That is up to a tenth of the period later than was asked for, so
+-- that all who have the same period wake together, ten times in a period at most.
+sleepToSlot :: Double -> Double -> Double -> IO Double
+sleepToSlot period from to
+  | to <= from = pure to
+  | otherwise = (fromIntegral end / fromIntegral aSecond) <$ sleepTicks (tick floor from) end
+ where
+  end = upTo (tick round period) (endOf from to)
+  upTo ticks t
+    | fromIntegral ticks == period * fromIntegral aSecond, (tenth, 0) <- ticks `divMod` 10 = t + (-t) `mod` tenth
+    | otherwise = t
+
+sleepTicks :: Tick -> Tick -> IO ()
+sleepTicks from end = go from 0
+ where
+  go t slept = do
+    let long = min (end - t) (max aSecond slept)
+    gateAt (t + long) >>= readMVar
+    when (t + long < end) $ go (t + long) (slept + long)
+
+-- | The tick to sleep until. (A century is as good as for ever, and can be counted.)
+endOf :: Double -> Double -> Tick
+endOf from to = tick ceiling (min to (from + 3e9) - 1e-6)
+
+-- | A moment, counted in eighths of a millisecond: finer than GHC's clocks can tell.
+type Tick = Int
+
+tick :: (Double -> Tick) -> Double -> Tick
+tick rounded seconds = rounded (seconds * fromIntegral aSecond)
+
+aSecond :: Tick
+aSecond = 8000
+
+-- | The gate that opens at the tick.
+gateAt :: Tick -> IO (MVar ())
+gateAt t = readIORef alarms >>= maybe (newGate t) pure . IntMap.lookup t . gates
+
+newGate :: Tick -> IO (MVar ())
+newGate t = mask_ $ do
+  new <- newEmptyMVar
+  (gate, unclocked) <- atomicModifyIORef' alarms $ \known ->
+    case IntMap.lookup t (gates known) of
+      Just old -> (known, (old, False))
+      Nothing
+        | t `isBeforeAll` clocks known -> (Alarms others (t : clocks known), (new, True))
+        | otherwise -> (known {gates = others}, (new, False))
+       where
+        others = IntMap.insert t new (gates known)
+  when unclocked . void . forkIO $ do
+    self <- myThreadId
+    labelThread self "clock"
+    clock t t
+  pure gate
+
+isBeforeAll :: Tick -> [Tick] -> Bool
+isBeforeAll t = all (t <) . take 1
+
+-- | Goes off at the tick, or a little later as the second one says. Then it is set for the
+-- next gate, unless another goes off before.
+clock :: Tick -> Tick -> IO ()
+clock t later = do
+  getMonotonicTime >>= delay
+  current <- tick floor <$> getMonotonicTime
+  (due, next) <- atomicModifyIORef' alarms (goOff current)
+  traverse_ (`putMVar` ()) due
+  -- First those who were woken: if they have gone to sleep again when this thread does,
+  -- the system has no thread to wake for them.
+  yield
+  for_ next $ \t' -> clock t' (max t' (current + pause))
+ where
+  delay now = when (left > 0) $ sleepFor left >> getMonotonicTime >>= delay
+   where
+    left = fromIntegral later / fromIntegral aSecond - now
+  goOff current known = (Alarms future (maybe others (: others) next), (IntMap.elems past ++ toList now, next))
+   where
+    (past, now, future) = IntMap.splitLookup current (gates known)
+    others = delete t (clocks known)
+    next = IntMap.lookupMin future >>= \(at, _) -> if at `isBeforeAll` others then Just at else Nothing
+
+-- | How long a clock rests at least, for all who want to wake meanwhile.
+pause :: Tick
+pause = 6
+
+-- | Sleeps for about so many seconds. The system's sleep is more exact than GHC's, which
+-- counts whole milliseconds, and dear to set; but only where it does not stop all threads.
+sleepFor :: Double -> IO ()
+sleepFor seconds
+  | rtsSupportsBoundThreads && seconds < 0.5 = void (usleep (microseconds seconds))
+  | otherwise = threadDelay (microseconds (min 86400 (max 0.0001 (seconds - 0.25))))
+ where
+  microseconds :: Integral n => Double -> n
+  microseconds = ceiling . (* 1000000)
+
+foreign import ccall safe "usleep" usleep :: CUInt -> IO CInt
