@@ -1,4 +1,4 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench soak ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -12,7 +12,8 @@ help:
 	@echo 'make check     what cabal has to say about the package'
 	@echo 'make matrix    demo and test in clean Debian systems (SUITES="bookworm" selects)'
 	@echo 'make ci        all of these'
-	@echo 'make bench     what it costs: figures and ratios, with their targets'
+	@echo 'make bench     what it costs, and whether that is as promised (KEEP=1 keeps the ratios;'
+	@echo '               make bench-check: is anything slower than in those that are kept?)'
 	@echo 'make soak      ever more random schedules and programs (SECONDS=600 for ten minutes)'
 	@echo 'make clean     remove what was built'
 
@@ -30,7 +31,10 @@ matrix:
 	@.ci/matrix $(SUITES)
 
 bench:
-	@.ci/bench
+	@.ci/bench $(if $(KEEP),keep)
+
+bench-check:
+	@.ci/bench check
 
 soak:
 	@.ci/soak $(or $(SECONDS),300)

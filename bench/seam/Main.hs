@@ -1,12 +1,13 @@
 -- |
--- What the operators cost, a line for each: its name, nanoseconds and allocated bytes. It
--- is built twice, with the seam's switch and without.
+-- What the operators cost: a line for nanoseconds, and one for allocated bytes. It is
+-- built twice, with the seam's switch and without, and told which it is.
 module Main (main) where
 
 import Control.Concurrent (runInUnboundThread)
 import Control.Concurrent.STM (newTVarIO, readTVar)
 import Control.Monad (forM_, replicateM_, void)
 import GHC.Stats (allocated_bytes, getRTSStats)
+import System.Environment (getArgs)
 import System.Mem (performMinorGC)
 
 import Behavior
@@ -16,6 +17,7 @@ import Behavior.Time (atomically, now)
 
 main :: IO ()
 main = runInUnboundThread $ do
+  switch <- unwords <$> getArgs
   level <- newTVarIO (50 :: Int)
   let low = (< 10) <$> Signal.watching (readTVar level)
       measured =
@@ -36,7 +38,10 @@ main = runInUnboundThread $ do
     ended <- now
     after <- allocated
     let nanoseconds = realToFrac (ended - begun) * 1e9 / fromIntegral times :: Double
-    putStrLn (name ++ "\t" ++ show nanoseconds ++ "\t" ++ show ((after - before) `div` fromIntegral times))
+        bytes = (after - before) `div` fromIntegral times
+        report unit figure = putStrLn ("seam " ++ switch ++ " " ++ unit ++ ": " ++ name ++ "\t" ++ figure)
+    report "ns" (show nanoseconds)
+    report "bytes" (show bytes)
  where
   -- Each thread's account is settled when it has run, or by a collection.
   allocated = performMinorGC >> allocated_bytes <$> getRTSStats

@@ -1,0 +1,49 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- The robot of the paper's section 6, one of many.
+module Agent
+  ( Agent (..)
+  , newAgent
+  , mission
+  ) where
+
+import Control.Concurrent.STM (TVar, newTVarIO, readTVar, retry, writeTVar)
+
+import Behavior
+import qualified Behavior.Signal as Signal
+import Behavior.Time (atomically)
+
+-- | A robot, as its program sees it.
+data Agent = Agent
+  { battery :: TVar Int
+  , news :: TVar News
+  }
+
+data Door = Front | Back
+  deriving (Eq)
+
+data Step = Open Door | PassThrough Door | Task
+  deriving (Eq)
+
+-- | What the world tells of the robot's latest step.
+data News = None | Done Step | Undone Step
+
+newAgent :: IO Agent
+newAgent = Agent <$> newTVarIO 100 <*> newTVarIO None
+
+-- | Enters the room, by one door or the other, and does the task there; recharges when
+-- the battery is low. The action given is done whenever the robot sets out.
+mission :: Agent -> Behavior () -> Behavior ()
+mission agent setOut = Signal.monitor batteryLow recharge (setOut >> enterRoom >> does Task)
+ where
+  batteryLow = (< 10) <$> Signal.watching (readTVar (battery agent))
+  recharge = atomically (writeTVar (battery agent) 100)
+  enterRoom = enterBy Front ? enterBy Back
+  enterBy door = does (Open door) >> does (PassThrough door)
+  does step =
+    atomically $
+      readTVar (news agent) >>= \case
+        Done it | it == step -> pure ()
+        Undone it | it == step -> failed
+        _ -> retry

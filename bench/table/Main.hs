@@ -1,0 +1,146 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- The table of what was promised of speed, what was measured, and whether it is met.
+--
+-- It reads the rounds: lines of a name, a tab and a number. A line of a name, a tab and
+-- anything else says why there are no measurements whose names begin so. It shows the
+-- table; and with @keep FILE@ it writes down the ratios, with @check FILE@ it tells which
+-- of them have become worse by more than a third.
+module Main (main) where
+
+import Data.Either (fromLeft)
+import Data.Foldable (for_)
+import Data.List (find, intercalate, isPrefixOf)
+import qualified Data.Map.Strict as Map
+import Numeric (showFFloat)
+import System.Environment (getArgs)
+import System.Exit (die, exitFailure)
+import System.IO (readFile')
+import Text.Read (readMaybe)
+
+import Promises
+import Row
+
+main :: IO ()
+main = do
+  measured <- heard . lines <$> getContents
+  putStrLn (spread ["", "ours", "", "theirs", "ratio", "target", ""])
+  for_ promises $ \group -> do
+    putStrLn ("\n-- " ++ heading group ++ " (" ++ options group ++ ")")
+    mapM_ (putStrLn . spread . cells measured) (rows group)
+  getArgs >>= \case
+    [] -> pure ()
+    ["keep", file] -> keep file (ratiosOf measured)
+    ["check", file] -> check file (ratiosOf measured)
+    _ -> die "usage: table [keep FILE | check FILE]"
+
+-- What was measured.
+
+-- | The rounds of each measurement, and whose measurements there are not, and why.
+data Heard = Heard (Map.Map String [Double]) [(String, String)]
+
+heard :: [String] -> Heard
+heard report =
+  Heard
+    (Map.fromListWith (++) [(name, [number]) | (name, Right number) <- said])
+    [(name, why) | (name, Left why) <- said]
+ where
+  said = map (fmap (meaning . drop 1) . break (== '\t')) report
+  meaning text = maybe (Left text) Right (readMaybe text)
+
+-- | What its rounds come to, or why there are none.
+valueOf :: Heard -> Figure -> Either String Double
+valueOf (Heard rounds absences) figure = case Map.lookup (named figure) rounds of
+  Just numbers -> Right (fold figure * comesTo figure numbers)
+  Nothing -> Left (maybe "absent: not measured" snd (find ((`isPrefixOf` named figure) . fst) absences))
+
+ratioOf :: Heard -> Figure -> Figure -> Either String Double
+ratioOf measured mine theirs = over <$> valueOf measured mine <*> valueOf measured theirs
+ where
+  a `over` b = if a == b then 1 else a / b
+
+-- The table.
+
+cells :: Heard -> Row -> [String]
+cells measured (Row mine promise) =
+  [label mine, shown value] ++ case promise of
+    Times bound theirs ->
+      let ratio = ratioOf measured mine theirs
+       in [ label theirs
+          , shown (valueOf measured theirs)
+          , shown ratio
+          , "<= " ++ significant bound
+          , verdict (<= bound) ratio
+          ]
+    AtMost bound -> ["", "", "", "<= " ++ significant bound, verdict (<= bound) value]
+    AtLeast bound -> ["", "", "", ">= " ++ significant bound, verdict (>= bound) value]
+    NoPromise -> ["", "", "", "", fromLeft "" value]
+ where
+  value = valueOf measured mine
+  shown = either (const "-") significant
+  verdict meets = either id (\number -> if meets number then "met" else "NOT MET")
+
+label :: Figure -> String
+label figure
+  | fold figure == 1 = named figure
+  | otherwise = show (round (fold figure) :: Int) ++ " x " ++ named figure
+
+-- | In columns: words to the left, numbers to the right.
+spread :: [String] -> String
+spread = unwords . zipWith ($) [left 40, right 10, left 40, right 10, right 7, right 11, id]
+ where
+  left n text = text ++ replicate (n - length text) ' '
+  right n text = replicate (n - length text) ' ' ++ text
+
+-- | Three significant digits, and all those before the point.
+significant :: Double -> String
+significant number = showFFloat (Just (if number == 0 then 0 else max 0 (2 - magnitude))) number ""
+ where
+  magnitude = floor (logBase 10 (abs number))
+
+-- The ratios that are kept, a line for each.
+
+type Pair = (String, String)
+
+ratiosOf :: Heard -> Map.Map Pair Double
+ratiosOf measured =
+  Map.fromList
+    [ (pairOf mine theirs, ratio)
+    | Row mine (Times _ theirs) <- concatMap rows promises
+    , Right ratio <- [ratioOf measured mine theirs]
+    ]
+
+pairOf :: Figure -> Figure -> Pair
+pairOf mine theirs = (label mine, label theirs)
+
+kept :: FilePath -> IO (Map.Map Pair Double)
+kept file = Map.fromList . map (entry . split) . lines <$> readFile' file
+ where
+  split text = case break (== '\t') text of
+    (word, '\t' : others) -> word : split others
+    (word, _) -> [word]
+  entry [mine, theirs, ratio] | Just number <- readMaybe ratio = ((mine, theirs), number)
+  entry other = error (file ++ ": not a ratio: " ++ show other)
+
+-- | In the order of the table. What was not measured this time stays as it was.
+keep :: FilePath -> Map.Map Pair Double -> IO ()
+keep file ratios = do
+  before <- kept file
+  writeFile file . unlines $
+    [ intercalate "\t" [label mine, label theirs, significant ratio]
+    | Row mine (Times _ theirs) <- concatMap rows promises
+    , Just ratio <- [Map.lookup (pairOf mine theirs) (Map.union ratios before)]
+    ]
+
+check :: FilePath -> Map.Map Pair Double -> IO ()
+check file ratios = do
+  before <- kept file
+  putStrLn ("\n-- Beside the ratios in " ++ file)
+  for_ (Map.toList (before Map.\\ ratios)) $ \(pair, _) -> putStrLn (both pair ++ ": not measured")
+  let worse = Map.filter (\(ratio, was) -> ratio > was * 4 / 3) (Map.intersectionWith (,) ratios before)
+  for_ (Map.toList worse) $ \(pair, (ratio, was)) ->
+    putStrLn (both pair ++ ": SLOWER, " ++ significant ratio ++ " where it was " ++ significant was)
+  if null worse then putStrLn "none is slower by more than a third" else exitFailure
+ where
+  both (mine, theirs) = mine ++ " / " ++ theirs

@@ -1,0 +1,159 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- What is promised of speed, row by row.
+module Promises (promises) where
+
+import Data.String (fromString)
+
+import Row
+
+promises :: [Group]
+promises =
+  [trying, together, reacting, manyBranches, rules, standingStill, longPrograms]
+    ++ [reactions, idleFleet, fleetBytes, fleetTime]
+    ++ [seamTime, seamBytes, simulator, simulatedDay]
+
+-- What the operators cost, beside what does the same by hand, or as behaviour trees do it.
+
+trying, together, reacting, manyBranches, rules, standingStill, longPrograms :: Group
+trying =
+  operators
+    "Fallback: nanoseconds"
+    [ "? that succeeds" `within` 1.1 `times` "try that succeeds"
+    , "? that fails" `within` 1.1 `times` "try that fails"
+    ]
+together =
+  operators
+    "Two at once: nanoseconds"
+    [ "parallel, both end at once" `within` 1.3 `times` "race, both end at once"
+    , "parallel, one to be stopped" `within` 1.3 `times` "race, one to be stopped"
+    , "both, both end at once" `within` 1.3 `times` "concurrently_, both end at once"
+    , "both, one to be stopped" `within` 1.3 `times` "concurrently_, one to be stopped"
+    ]
+reacting =
+  operators
+    "Reacting: nanoseconds"
+    [ "monitor, undisturbed" `within` 1.3 `times` "race, both end at once"
+    , "rSelect, undisturbed" `within` 1.3 `times` "race, both end at once"
+    , "monitor, polled" `within` 2 `times` "race, both end at once"
+    , "interruption, recovery and restart" `within` 1.5 `times` scaled 2 "race, one to be stopped"
+    ]
+manyBranches =
+  operators "Many at once, and n/2 times the cost for 2: nanoseconds" $
+    concat
+      [ ["firstOf" `of'` n `within` 1.2 `times` scaled (n / 2) "firstOf 2" | n <- [10, 100, 1000]]
+      , ["allOf" `of'` n `within` 1.2 `times` scaled (n / 2) "allOf 2" | n <- [10, 100, 1000]]
+      , [operator `of'` 100 `atMost` 60 * microseconds | operator <- ["firstOf", "allOf"]]
+      ]
+rules =
+  operators
+    "Ordered rules, a change: nanoseconds"
+    [ "teleoReactive" `of'` n `within` share `times` (peer ++ " rules tick") `of'` n
+    | (peer, share) <- [("bonsai", 1 / 3), ("py_trees", 1)]
+    , n <- [10, 100, 1000]
+    ]
+standingStill =
+  operators
+    "Ordered rules, no change: seconds of the processor a second"
+    ["teleoReactive idle cpu" `of'` n `atMost` 0.001 | n <- [10, 100, 1000]]
+longPrograms =
+  operators
+    "100,000 steps: nanoseconds a step"
+    [ "sequence, a step" `within` 1 `times` "bonsai sequence step"
+    , "sequence, a step" `within` 1 `times` "py_trees sequence step"
+    , "fallback, a step" `within` 1 `times` "bonsai fallback step"
+    , "fallback, a step" `within` 1 `times` "py_trees fallback step"
+    , "fallback, a step" `within` 1.1 `times` "try that fails"
+    ]
+
+operators :: String -> [Row] -> Group
+operators title = Group title "-N1 -A4m"
+
+-- From the change of a condition to the start of the recovery, beside a bare thread.
+
+reactions :: Group
+reactions =
+  Group "A condition changes, its recovery starts: microseconds" "-N1, -N2 -qm" $
+    concat
+      [ [ measured n share "ours" `within` bound `times` measured n share "bare"
+        | n <- ["N1", "N2"]
+        , (share, bound) <- [("p50", 2), ("p99", 3), ("p99.9", 5)]
+        ]
+      , [ measured n share "ours" `atMost` bound
+        | (n, share, bound) <- [("N1", "p50", 5), ("N1", "p99", 50), ("N2", "p50", 16), ("N2", "p99", 106)]
+        ]
+      , ["reaction among 100000 p99 ours" `within` 5 `times` "reaction among 0 p99 ours"]
+      ]
+ where
+  measured n share whose = fromString (unwords ["reaction", n, share, whose])
+
+-- A fleet of agents in one process.
+
+idleFleet, fleetBytes, fleetTime :: Group
+idleFleet =
+  fleet
+    "A fleet, nothing changes: seconds of the processor a second"
+    ["fleet idle cpu 100000" `within` 0.01 `times` "bonsai fleet cpu 100000"]
+fleetBytes =
+  fleet
+    "A fleet: bytes an agent"
+    ["fleet bytes 100000" `within` 1 `times` "bonsai fleet bytes 100000"]
+fleetTime =
+  fleet
+    "A fleet: nanoseconds an agent or a reading"
+    [ "fleet creation 100000" `within` 1 `times` "bonsai fleet creation 100000"
+    , "fleet polled reading 10000" `within` 1 `times` "bonsai fleet tick 10000"
+    , "fleet polled reading 100000" `within` 1 `times` "bonsai fleet tick 100000"
+    ]
+
+fleet :: String -> [Row] -> Group
+fleet title = Group title "-N1"
+
+-- What it costs that the operators can be simulated: with the switch and without.
+
+seamTime, seamBytes :: Group
+seamTime =
+  Group "The seam, the shortest round: nanoseconds" "-N1" (seam "ns")
+seamBytes =
+  Group "The seam, the shortest round: bytes allocated" "-N1" (seam "bytes")
+
+seam :: String -> [Row]
+seam unit =
+  [ shortest (switch "with") `within` 1.1 `times` shortest (switch "without")
+  | operator <-
+      [ "? that succeeds"
+      , "? that fails"
+      , "atomically"
+      , "parallel"
+      , "both"
+      , "allOf 10"
+      , "monitor, watched"
+      , "monitor, polled"
+      ]
+  , let switch present = fromString (unwords ["seam", present, unit ++ ":", operator])
+  ]
+
+-- How fast the simulator is.
+
+simulator, simulatedDay :: Group
+simulator =
+  Group
+    "The simulator: so many a second"
+    "-N1 -A16m -ki2k"
+    [ "scheduling points, two threads in turn" `atLeast` 1 * million
+    , "scheduling points, one thread" `atLeast` 1 * million
+    , told "scheduling points, random schedules"
+    , told "random schedules of a small mission"
+    ]
+simulatedDay =
+  Group
+    "A simulated day, a sensor at 1 Hz and a thousand actions: seconds"
+    "-N1 -A16m -ki2k"
+    ["a simulated day" `atMost` 0.5]
+
+-- | The measurement of this for so many branches, rules or agents.
+of' :: String -> Double -> Figure
+operator `of'` n = fromString (operator ++ " " ++ show (round n :: Int))
+
+infix 3 `of'`
