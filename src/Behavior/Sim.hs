@@ -21,7 +21,7 @@
 --   n <- readTVarIO count
 --   if n == 2 then pure () else fail ("two boxes were picked up, and it counted " ++ show n)
 -- :}
--- *** Exception: schedule 88 fails:
+-- *** Exception: schedule 18 fails:
 --   user error (two boxes were picked up, and it counted 1)
 -- shrunk to one switch, this happens:
 --      0.000 s  0 main         transaction
@@ -33,7 +33,7 @@
 --      0.000 s  2 both: right  ends
 --      0.000 s  1 both: left   ends
 --      0.000 s  0 main         transaction
--- to see it again: explore (replaying (Switching [(6,2)]))
+-- to see it again: explore (replaying (Switching [(5,2)]))
 --
 -- The same behaviours are simulated that run on the robot: plain 'IO', whose waiting goes
 -- through this library. "Behavior.Sim.Mock" has actions, conditions and sensors to take

@@ -189,7 +189,7 @@ mistakes = do
         misfit switches text = do
           run <- simulateWith defaults {scheduled = Switching switches} small
           explain (outcome run) `shouldContain` ("the schedule does not fit this behaviour: " ++ text)
-    it "as no such thread can run" $ misfit [(3, 7)] "at point 3 thread 7 cannot run; those that can: [0,1,2]"
+    it "as no such thread can run" $ misfit [(3, 7)] "at point 3 thread 7 cannot run; those that can: [1,2]"
     it "as the run is shorter" $ misfit [(300, 1)] "the run ended before point 300"
     it "as only one could run there" $ misfit [(1, 1)] "the run ended before point 1"
  where

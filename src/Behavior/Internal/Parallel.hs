@@ -20,7 +20,7 @@ module Behavior.Internal.Parallel
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally, throwIO)
-import Control.Monad (filterM, void, (<=<))
+import Control.Monad (filterM, foldM, void, (<=<))
 import Data.Foldable (asum, toList)
 import Data.Maybe (isJust, listToMaybe)
 import Data.Traversable (for, mapAccumL)
@@ -54,8 +54,8 @@ import Behavior.Internal.Scope
 --
 -- @since 0.1.0.0
 parallel :: Behavior a -> Behavior b -> Behavior ()
-parallel left right =
-  race [(Label "parallel" "left", void left), (Label "parallel" "right", void right)]
+parallel left right = race $ \scope ->
+  sequence [branch scope (Label "parallel" "left") (void left), branch scope (Label "parallel" "right") (void right)]
 
 -- | 'parallel' as an operator. It binds looser than @?@ and tighter than
 -- 'Prelude.>>'. (@Control.Arrow@ has another function of this name.)
@@ -87,8 +87,19 @@ infixr 2 |||
 --
 -- @since 0.1.0.0
 both :: Behavior a -> Behavior b -> Behavior ()
-both left right =
-  void (gather [(Label "both" "left", void left), (Label "both" "right", void right)])
+both left right = structured $ \scope -> do
+  l <- branch scope (Label "both" "left") (void left)
+  r <- branch scope (Label "both" "right") (void right)
+  let -- The left one first: when that has ended, it has also when the other is looked at.
+      atAGlance = outcomeNow l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$> outcomeNow r)
+      atOnce = verdict <$> outcomeSoFar l <*> outcomeSoFar r
+  atomicallyUnless atAGlance (atOnce >>= maybe retry pure)
+ where
+  verdict l r = case (result <$> l, result <$> r) of
+    (Just (Left e), _) -> Just (throwIO e)
+    (_, Just (Left e)) -> Just (throwIO e)
+    (Just (Right ()), Just (Right ())) -> Just (pure ())
+    _ -> Nothing
 
 -- | Starts all at once and gives the result of the first to finish.
 --
@@ -107,7 +118,7 @@ both left right =
 -- @since 0.1.0.0
 firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
-firstOf behaviors = race (snd (numbered "firstOf" behaviors))
+firstOf behaviors = race $ \scope -> startAll (branch scope . Label "firstOf") behaviors
 
 -- | Starts all at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
@@ -122,44 +133,45 @@ firstOf behaviors = race (snd (numbered "firstOf" behaviors))
 --
 -- @since 0.1.0.0
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
-allOf = gather . snd . numbered "allOf"
-
--- | Gives every behaviour the label of its operator and place.
-numbered :: Traversable t => String -> t (Behavior a) -> (Int, t (Label, Behavior a))
-numbered operator = mapAccumL (\n act -> (n + 1, (Label operator (show n), act))) 1
-
-race :: [(Label, Behavior a)] -> Behavior a
-race behaviors = structured $ \scope -> do
-  branches <- traverse (uncurry (branch scope)) behaviors
-  settle <$> atomicallyUnless (leftNow branches) (leftmost branches)
- where
-  -- Only the left one: of the others it could not be said that the left one had not
-  -- ended before.
-  leftNow = maybe (pure Nothing) outcomeNow . listToMaybe
-
-gather :: Traversable t => t (Label, Behavior a) -> Behavior (t a)
-gather behaviors = structured $ \scope -> do
+allOf behaviors = structured $ \scope -> do
   -- One variable tells of trouble anywhere, so that waiting for n branches takes
   -- n looks at two variables, and not n looks at n.
   trouble <- newTVarIO False
-  branches <- traverse (uncurry (branchThen (troubling trouble) scope)) behaviors
-  let -- From left to right, at a glance.
-      verdictNow = foldr glance (pure (Just results)) branches
-      glance b others =
-        outcomeNow b >>= \case
-          Nothing -> pure Nothing
-          Just end -> either (pure . Just . throwIO) (const others) (result end)
-      waiting [] = pure results
+  branches <- startAll (branchThen (troubling trouble) scope . Label "allOf") (toList behaviors)
+  let waiting [] = pure (refilled behaviors <$> traverse (settle <=< ended) branches)
       waiting (b : bs) = do
         quiet <-
           atomicallyUnless ((True <$) <$> completedNow b) $
             outcomeSoFar b >>= \case
               Just (Completed _) -> pure True
               _ -> False <$ (readTVar trouble >>= check)
-        if quiet then waiting bs else throwIO <$> atomically (leftmostWrong (toList branches))
-      -- (When all have completed.)
-      results = traverse (settle <=< ended) branches
-  atomicallyUnless (fmap Just <$> verdictNow) (pure Nothing) >>= maybe (waiting (toList branches)) pure
+        if quiet then waiting bs else throwIO <$> atomically (leftmostWrong branches)
+  waiting branches
+
+-- | The container, with these (as many) for its elements.
+refilled :: Traversable t => t x -> [a] -> t a
+refilled container = snd . flip (mapAccumL next) container
+ where
+  next (a : as) _ = (as, a)
+  next [] _ = error "refilled: there are fewer elements than places"
+
+-- | Starts behaviours from left to right, each with its number for a name.
+--
+-- In constant stack: after each start GHC may turn to another thread, and before that it
+-- walks through all of this one's stack.
+startAll :: (String -> Behavior a -> IO (Branch a)) -> [Behavior a] -> IO [Branch a]
+startAll starting = fmap reverse . foldM next [] . zip [1 :: Int ..]
+ where
+  next started (n, act) = (: started) <$> starting (show n) act
+
+race :: (Scope -> IO [Branch a]) -> Behavior a
+race starting = structured $ \scope -> do
+  branches <- starting scope
+  settle <$> atomicallyUnless (leftNow branches) (leftmost branches)
+ where
+  -- Only the left one: of the others it could not be said that the left one had not
+  -- ended before.
+  leftNow = maybe (pure Nothing) outcomeNow . listToMaybe
 
 -- | Tells of trouble if a branch threw.
 troubling :: TVar Bool -> Either SomeException a -> STM ()

@@ -55,10 +55,10 @@ import Control.Exception
   , try
   , uninterruptibleMask_
   )
-import Control.Monad (filterM)
+import Control.Monad (filterM, unless)
 import Data.Foldable (for_)
-import Data.IORef (IORef, atomicModifyIORef', modifyIORef', newIORef, readIORef, writeIORef)
-import Data.Maybe (isJust)
+import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
+import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime
@@ -127,14 +127,17 @@ structured body = mask $ \restore -> do
 end :: Scope -> IO [SomeException]
 end (Scope branches) = do
   started <- reverse <$> readIORef branches
+  running <- filterM isRunning started
   -- Nothing may interrupt this, or the rest would be orphaned.
-  uninterruptibleMask_ (ask started)
-  concat <$> traverse (\(SomeBranch b) -> faults <$> endedFirmly b) started
+  unless (null running) $ uninterruptibleMask_ (ask running)
+  faults started
  where
-  endedFirmly b = outcomeNow b >>= maybe (firmly (ended b)) pure
-  faults = \case
-    Faulted e -> [e]
-    _ -> []
+  isRunning (SomeBranch b) = isNothing <$> outcomeNow b
+  faults [] = pure []
+  faults (SomeBranch b : others) =
+    outcomeNow b >>= maybe (firmly (ended b)) pure >>= \case
+      Faulted e -> (e :) <$> faults others
+      _ -> faults others
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
@@ -197,8 +200,9 @@ stopping = Stop . branchId
 -- | Marks a branch as asked. False if it was asked before, or has ended.
 marked :: SomeBranch -> IO Bool
 marked (SomeBranch b) = do
-  hasEnded <- isJust <$> threadEndNow (branchThread b)
-  if hasEnded then pure False else not <$> atomicModifyIORef' (branchAsked b) (\was -> (True, was))
+  needless <- (||) <$> (isJust <$> outcomeNow b) <*> readIORef (branchAsked b)
+  unless needless $ writeIORef (branchAsked b) True
+  pure (not needless)
 
 -- | Waits for the end of the branch.
 ended :: Branch a -> IO (Outcome a)
