@@ -11,6 +11,8 @@
 module Behavior.Internal.Alarm
   ( sleepBetween
   , sleepToSlot
+  , slotTime
+  , nextGate
   ) where
 
 import Control.Concurrent (forkIO, myThreadId, rtsSupportsBoundThreads, threadDelay, yield)
@@ -49,22 +51,32 @@ sleepBetween from to = when (to > from) $ sleepTicks (tick floor from) (endOf fr
 -- gives the time of it. That is up to a tenth of the period later than was asked for, so
 -- that all who have the same period wake together, ten times in a period at most.
 sleepToSlot :: Double -> Double -> Double -> IO Double
-sleepToSlot period from to
-  | to <= from = pure to
-  | otherwise = (fromIntegral end / fromIntegral aSecond) <$ sleepTicks (tick floor from) end
+sleepToSlot period from to = slot <$ sleepBetween from slot
  where
-  end = upTo (tick round period) (endOf from to)
+  slot = slotTime period from to
+
+-- | When that is.
+slotTime :: Double -> Double -> Double -> Double
+slotTime period from to
+  | to <= from = to
+  | otherwise = fromIntegral (upTo (tick round period) (endOf from to)) / fromIntegral aSecond
+ where
   upTo ticks t
     | fromIntegral ticks == period * fromIntegral aSecond, (tenth, 0) <- ticks `divMod` 10 = t + (-t) `mod` tenth
     | otherwise = t
 
 sleepTicks :: Tick -> Tick -> IO ()
-sleepTicks from end = go from 0
+sleepTicks from end = go from
  where
-  go t slept = do
-    let long = min (end - t) (max aSecond slept)
-    gateAt (t + long) >>= readMVar
-    when (t + long < end) $ go (t + long) (slept + long)
+  go t = do
+    let next = nextGate from end t
+    gateAt next >>= readMVar
+    when (next < end) $ go next
+
+-- | Where to wait next, having slept until the third, when it is to be from the first until
+-- the second.
+nextGate :: Tick -> Tick -> Tick -> Tick
+nextGate from end t = t + min (end - t) (max aSecond (t - from))
 
 -- | The tick to sleep until. (A century is as good as for ever, and can be counted.)
 endOf :: Double -> Double -> Tick

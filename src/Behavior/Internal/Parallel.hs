@@ -26,7 +26,7 @@ import Data.Maybe (isJust, listToMaybe)
 import Data.Traversable (for, mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, failed)
-import Behavior.Internal.Runtime (Label (..), atomically, atomicallyUnless)
+import Behavior.Internal.Runtime (Label (..), atomically, unlessAtAGlance)
 import Behavior.Internal.Scope
 
 -- $setup
@@ -93,7 +93,7 @@ both left right = structured $ \scope -> do
   let -- The left one first: when that has ended, it has also when the other is looked at.
       atAGlance = outcomeNow l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$> outcomeNow r)
       atOnce = verdict <$> outcomeSoFar l <*> outcomeSoFar r
-  atomicallyUnless atAGlance (atOnce >>= maybe retry pure)
+  unlessAtAGlance atAGlance (atomically (atOnce >>= maybe retry pure))
  where
   verdict l r = case (result <$> l, result <$> r) of
     (Just (Left e), _) -> Just (throwIO e)
@@ -141,7 +141,7 @@ allOf behaviors = structured $ \scope -> do
   let waiting [] = pure (refilled behaviors <$> traverse (settle <=< ended) branches)
       waiting (b : bs) = do
         quiet <-
-          atomicallyUnless ((True <$) <$> completedNow b) $
+          unlessAtAGlance ((True <$) <$> completedNow b) . atomically $
             outcomeSoFar b >>= \case
               Just (Completed _) -> pure True
               _ -> False <$ (readTVar trouble >>= check)
@@ -167,7 +167,7 @@ startAll starting = fmap reverse . foldM next [] . zip [1 :: Int ..]
 race :: (Scope -> IO [Branch a]) -> Behavior a
 race starting = structured $ \scope -> do
   branches <- starting scope
-  settle <$> atomicallyUnless (leftNow branches) (leftmost branches)
+  settle <$> unlessAtAGlance (leftNow branches) (atomically (leftmost branches))
  where
   -- Only the left one: of the others it could not be said that the left one had not
   -- ended before.

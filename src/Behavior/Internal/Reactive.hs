@@ -26,7 +26,7 @@ import Control.Monad (join)
 import Data.List (findIndex)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
-import Behavior.Internal.Runtime (Label (..), atomically, atomicallyUnless)
+import Behavior.Internal.Runtime (Label (..), atomically, unlessAtAGlance)
 import Behavior.Internal.Scope
 import Behavior.Internal.Source
 
@@ -46,85 +46,99 @@ data Reaction a
   | -- | End the operator.
     Conclude (IO a)
 
+-- | What an operator works with for as long as it runs.
+data Engine k a = Engine
+  { operator :: String
+  , scope :: Scope
+  , source :: Source k
+  , reaction :: k -> Reaction a
+  }
+
 -- | Runs what the reaction to the signal's value says, and switches when it says
 -- something else.
 react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
-react operator signal reaction = structured $ \scope -> do
-  source <- open signal
-  alike source (==)
-  let begin moment = do
-        (seen, sensors) <- startWorkers scope operator source
-        choose sensors seen moment
+react name signal reacting = structured $ \within -> do
+  opened <- open signal
+  alike opened (==)
+  begin Engine {operator = name, scope = within, source = opened, reaction = reacting} First
 
-      -- Nothing runs: read, and do what the value says now.
-      choose sensors seen moment = do
-        first <- observe (attend sensors (look seen moment))
-        obeying sensors (look seen Later) first
+-- | Starts the sensors.
+begin :: Eq k => Engine k a -> Moment -> IO (IO a)
+begin engine moment = do
+  (seen, sensors) <- startWorkers (scope engine) (operator engine) (source engine)
+  choose engine sensors seen moment
 
-      obeying sensors value = \case
-        Left dead -> pure (throwIO dead)
-        Right old -> case reaction old of
-          Conclude verdict -> pure verdict
-          RunToEnd name recovery -> do
-            askWithoutWaiting (map SomeBranch sensors)
-            recover sensors name recovery Nothing
-          Idle -> observe (attend sensors (changed value old)) >>= obeying sensors value
-          Run name act -> do
-            running <- branch scope (Label operator name) act
-            -- The branch is looked at first: one that has ended by itself is not
-            -- interrupted, whatever the signal says in the same transaction.
-            event <-
-              observeUnless (fmap Left <$> outcomeNow running) $
-                outcomeSoFar running
-                  >>= maybe (fmap Right <$> attend sensors (changed value old)) (pure . Right . Left)
-            case event of
-              Right (Left end) -> pure (settle end)
-              Right (Right new) -> interrupt sensors running (reaction new)
-              Left dead -> interrupt sensors running (Conclude (throwIO dead))
+-- | Nothing runs: reads, and does what the value says now.
+choose :: Eq k => Engine k a -> [Branch ()] -> View k -> Moment -> IO (IO a)
+choose engine sensors seen moment =
+  observe (attend sensors (look seen moment)) >>= obey engine sensors (look seen Later)
 
-      -- What is to come comes if the branch stops as it is asked to. If it
-      -- completes all the same, it has completed, and that is the end.
-      interrupt sensors running = \case
-        Conclude verdict ->
-          stopping (sensors `and'` running) >>= \case
-            Stopped _ -> pure verdict
-            end -> pure (settle end)
-        RunToEnd name recovery ->
-          stopping (sensors `and'` running) >>= \case
-            Completed a -> pure (pure a)
-            Stopped _ -> forget scope running >> recover sensors name recovery Nothing
-            -- A cleanup that went wrong must not keep the robot from its charger.
-            wrong -> recover sensors name recovery (Just (settle wrong))
-        _ ->
-          stopping ([] `and'` running) >>= \case
-            -- Read again: by now the value may be another, or the old one again.
-            Stopped _ -> do
-              forget scope running
-              seen <- atomically (view source)
-              choose sensors seen Later
-            end -> pure (settle end)
-       where
-        others `and'` b = map SomeBranch others ++ [SomeBranch b]
-        stopping branches = ask branches >> ended running
-
-      -- The sensors were asked to stop. The recovery does not wait for those that
-      -- are slow to, but what comes after it does.
-      recover sensors name recovery aftermath = do
-        recovered <- branch scope (Label operator name) recovery
-        end <- ended recovered
-        case (result end, aftermath) of
-          (_, Just verdict) -> pure verdict
-          (Left wrong, Nothing) -> pure (throwIO wrong)
-          (Right (), Nothing) -> do
-            forget scope recovered
-            rested <- traverse (rest scope) sensors
-            if and rested then begin Later else pure (failWith "a sensor faulted")
-  begin First
+obey :: Eq k => Engine k a -> [Branch ()] -> STM k -> Either SomeException k -> IO (IO a)
+obey engine sensors value = \case
+  Left dead -> pure (throwIO dead)
+  Right old -> case reaction engine old of
+    Conclude verdict -> pure verdict
+    RunToEnd name recovery -> do
+      askWithoutWaiting (map SomeBranch sensors)
+      recover engine sensors name recovery Nothing
+    Idle -> observe (attend sensors (changed old)) >>= obey engine sensors value
+    Run name act -> do
+      running <- branch (scope engine) (Label (operator engine) name) act
+      -- The branch is looked at first: one that has ended by itself is not
+      -- interrupted, whatever the signal says in the same transaction.
+      event <-
+        unlessAtAGlance (fmap (Right . Left) <$> outcomeNow running) . observe $
+          outcomeSoFar running
+            >>= maybe (fmap Right <$> attend sensors (changed old)) (pure . Right . Left)
+      case event of
+        Right (Left end) -> pure (settle end)
+        Right (Right new) -> interrupt engine sensors running (reaction engine new)
+        Left dead -> interrupt engine sensors running (Conclude (throwIO dead))
  where
-  changed value old = do
+  changed old = do
     new <- value
     check (new /= old)
     pure new
+
+-- | What is to come comes if the branch stops as it is asked to. If it completes all
+-- the same, it has completed, and that is the end.
+interrupt :: Eq k => Engine k a -> [Branch ()] -> Branch a -> Reaction a -> IO (IO a)
+interrupt engine sensors running = \case
+  Conclude verdict ->
+    stopping (sensors `and'` running) >>= \case
+      Stopped _ -> pure verdict
+      end -> pure (settle end)
+  RunToEnd name recovery ->
+    stopping (sensors `and'` running) >>= \case
+      Completed a -> pure (pure a)
+      Stopped _ -> forget (scope engine) running >> recover engine sensors name recovery Nothing
+      -- A cleanup that went wrong must not keep the robot from its charger.
+      wrong -> recover engine sensors name recovery (Just (settle wrong))
+  _ ->
+    stopping ([] `and'` running) >>= \case
+      -- Read again: by now the value may be another, or the old one again.
+      Stopped _ -> do
+        forget (scope engine) running
+        seen <- atomically (view (source engine))
+        choose engine sensors seen Later
+      end -> pure (settle end)
+ where
+  others `and'` b = map SomeBranch others ++ [SomeBranch b]
+  stopping branches = ask branches >> ended running
+
+-- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
+-- those that are slow to, but what comes after it does.
+recover :: Eq k => Engine k a -> [Branch ()] -> String -> Behavior () -> Maybe (IO a) -> IO (IO a)
+recover engine sensors name recovery aftermath = do
+  recovered <- branch (scope engine) (Label (operator engine) name) recovery
+  end <- ended recovered
+  case (result end, aftermath) of
+    (_, Just verdict) -> pure verdict
+    (Left wrong, Nothing) -> pure (throwIO wrong)
+    (Right (), Nothing) -> do
+      forget (scope engine) recovered
+      rested <- traverse (rest (scope engine)) sensors
+      if and rested then begin engine Later else pure (failWith "a sensor faulted")
 
 -- | Looks at a value, and first at the sensors that it comes from.
 attend :: [Branch ()] -> STM a -> STM (Either SomeException a)
@@ -134,17 +148,13 @@ attend sensors value = foldr (\sensor others -> lost sensor >>= maybe others (pu
 observe :: STM (Either SomeException a) -> IO (Either SomeException a)
 observe = fmap join . trySynchronous . atomically
 
--- | Likewise, if a glance does not make that needless.
-observeUnless :: IO (Maybe a) -> STM (Either SomeException a) -> IO (Either SomeException a)
-observeUnless glance = fmap join . trySynchronous . atomicallyUnless (fmap Right <$> glance)
-
 -- | Waits until a branch that was asked to stop has ended. If it faulted it stays
 -- in the scope, which throws its fault.
 rest :: Scope -> Branch () -> IO Bool
-rest scope sensor =
+rest within sensor =
   ended sensor >>= \case
     Faulted _ -> pure False
-    _ -> True <$ forget scope sensor
+    _ -> True <$ forget within sensor
 
 -- | A reactive @if@: runs @left@ while the condition is true and @right@ while it
 -- is false, and switches whenever it changes.

@@ -25,7 +25,7 @@ module Behavior.Internal.Runtime
     -- * Waiting
   , atomically
   , firmly
-  , atomicallyUnless
+  , unlessAtAGlance
   , checkpoint
   , giveWay
 
@@ -76,8 +76,8 @@ import Behavior.Internal.Simulator
 
 -- | A thread that the library has started, and how it ends.
 data Thread a = Thread
-  { threadId :: ThreadId
-  , threadResult :: TVar (Maybe (Either SomeException a))
+  { threadId :: {-# UNPACK #-} !ThreadId
+  , threadResult :: {-# UNPACK #-} !(TVar (Maybe (Either SomeException a)))
   -- ^ Nothing until it has ended, cleanup included.
   }
 
@@ -213,18 +213,15 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
  where
   simulated simulation = transact simulation transaction
 
--- | 'atomically', where a glance may make the transaction needless: of those who wait for
--- each other most are done when they have had their turn, and to wait in a transaction
--- is dear.
+-- | Waits, unless a glance makes that needless: of those who wait for each other most are
+-- done when they have had their turn, and to wait in a transaction is dear.
 --
--- What the glance gives must be what the transaction would have, at some moment
--- meanwhile: it should look at one variable only. (In a simulation there is no glance.)
-atomicallyUnless :: IO (Maybe a) -> STM a -> IO a
-atomicallyUnless glance transaction =
-  inSimulation (reallyUnless glance transaction) (`transact` transaction)
-
-reallyUnless :: IO (Maybe a) -> STM a -> IO a
-reallyUnless glance transaction = glance >>= maybe (yield >> glance >>= maybe (STM.atomically transaction) pure) pure
+-- What the glance gives must be what the wait would have given, at some moment meanwhile:
+-- it should look at one variable only. (In a simulation there is no glance.)
+unlessAtAGlance :: IO (Maybe a) -> IO a -> IO a
+unlessAtAGlance glance waiting = inSimulation really (const waiting)
+ where
+  really = glance >>= maybe (yield >> glance >>= maybe waiting pure) pure
 
 -- | A wait that nothing can interrupt; for the end of threads that were asked to stop.
 -- GHC's deadlock detector is not heeded: it takes a thread that waits for a cleanup which

@@ -69,8 +69,8 @@ newtype Scope = Scope (IORef [SomeBranch])
 
 -- | A behaviour that runs in a thread of its own on behalf of an operator.
 data Branch a = Branch
-  { branchThread :: Thread a
-  , branchAsked :: IORef Bool
+  { branchThread :: {-# UNPACK #-} !(Thread a)
+  , branchAsked :: {-# UNPACK #-} !(IORef Bool)
   -- ^ Whether it was asked to stop: nobody is asked twice, for the second
   -- request would interrupt the cleanup that the first one began.
   }
@@ -135,9 +135,10 @@ end (Scope branches) = do
   isRunning (SomeBranch b) = isNothing <$> outcomeNow b
   faults [] = pure []
   faults (SomeBranch b : others) =
-    outcomeNow b >>= maybe (firmly (ended b)) pure >>= \case
+    endedFirmly b >>= \case
       Faulted e -> (e :) <$> faults others
       _ -> faults others
+  endedFirmly b = unlessAtAGlance (outcomeNow b) (firmly (atomically (outcome b)))
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
@@ -206,7 +207,7 @@ marked (SomeBranch b) = do
 
 -- | Waits for the end of the branch.
 ended :: Branch a -> IO (Outcome a)
-ended b = atomicallyUnless (outcomeNow b) (outcome b)
+ended b = unlessAtAGlance (outcomeNow b) (atomically (outcome b))
 
 -- | How the branch has ended, if it has, at a glance.
 outcomeNow :: Branch a -> IO (Maybe (Outcome a))

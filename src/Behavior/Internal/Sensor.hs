@@ -23,10 +23,15 @@ import Behavior.Internal.Source
 -- | A sensor that must be asked: @polling seconds act@ reads it by @act@, in a
 -- thread of its own, one reading at a time.
 --
--- Readings start at slots that are so many seconds apart, counted from start to
--- start. A reading that overruns its slot skips those that it missed. What an
--- operator decides on is always a reading that began after it asked; so after a
+-- Readings start in slots that are so many seconds apart, counted from start to
+-- start, one in each. A reading that overruns its slot skips those that it missed.
+-- What an operator decides on is always a reading that began after it asked; so after a
 -- branch was stopped it waits for the next slot.
+--
+-- The first reading is made at once. Then sensors of the same period are read together:
+-- the second reading may come up to a tenth of a period late, and those after it are
+-- exact, an hour later to a millisecond. One that is late for its slot, because the
+-- machine is busy, does not put off the others.
 --
 -- A reading that fails or faults is no value: the operator throws the same. The
 -- number of seconds must be more than zero (an 'Control.Exception.ErrorCall' says so).

@@ -24,7 +24,7 @@ module Behavior.Internal.Source
 import Control.Applicative (liftA2)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally)
-import Control.Monad (unless, when)
+import Control.Monad (when)
 import Data.Foldable (for_, traverse_)
 import Data.Function (on)
 import Data.Traversable (for)
@@ -186,12 +186,13 @@ withShared signal body = do
 -- view comes first, and so do those of the workers: else they might just miss the
 -- first reading, and wait for a second one.
 startWorkers :: Scope -> String -> Source a -> IO (View a, [Branch ()])
-startWorkers scope operator source = do
-  (works, seen) <- atomically ((,) <$> traverse work (workers source) <*> view source)
-  running <- for (zip (workers source) works) $ \(w, run) ->
-    worker scope (Label operator (workerName w)) run
-  unless (null running) giveWay
-  pure (seen, running)
+startWorkers scope operator source = case workers source of
+  [] -> (\seen -> (seen, [])) <$> atomically (view source)
+  needed -> do
+    (works, seen) <- atomically ((,) <$> traverse work needed <*> view source)
+    running <- for (zip needed works) $ \(w, run) ->
+      worker scope (Label operator (workerName w)) run
+    (seen, running) <$ giveWay
 
 -- | What a worker has died of, if it has. (One that was asked to stop has not.)
 lost :: Branch () -> STM (Maybe SomeException)
