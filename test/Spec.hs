@@ -2,9 +2,11 @@ module Main (main) where
 
 import Test.Hspec
 
+import qualified Behavior.AlarmSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.MonitorSpec
+import qualified Behavior.NewsSpec
 import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
 import qualified Behavior.ParallelSpec
@@ -46,13 +48,16 @@ main = hspec $ do
     Behavior.SignalSpec.spec
     Behavior.PollingSpec.spec
     Behavior.BadReadingSpec.spec
+    Behavior.NewsSpec.spec
     Behavior.RefinedSpec.spec
     Behavior.OperatorsSpec.spec
     Behavior.OutcomeSpec.spec
     Behavior.ReactiveSpec.spec
     Behavior.MonitorSpec.spec
   describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
-  describe "Time" Behavior.TimeSpec.spec
+  describe "Time" $ do
+    Behavior.TimeSpec.spec
+    Behavior.AlarmSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
   describe "Promises" Behavior.PromisesSpec.spec

@@ -6,8 +6,11 @@
 -- 'MVar' cost, and to be interrupted costs nothing: there is nothing to take back.
 --
 -- Who is interrupted leaves a place in the gate's queue until it opens. Therefore nobody
--- waits at a gate that is farther away than he has slept already, or than a second: the
--- places that are left are never many more than the sleepers.
+-- waits at a gate that is farther away than he has slept already, or than a second: what is
+-- left of a short sleep is gone within a second, and of a long one within its length.
+--
+-- (A process that was made by @forkProcess@ while another thread slept has that one's
+-- clock, but nobody who keeps it: there nothing wakes.)
 module Behavior.Internal.Alarm
   ( sleepBetween
   , sleepToSlot
@@ -45,25 +48,27 @@ alarms = unsafePerformIO (newIORef (Alarms IntMap.empty []))
 -- | Sleeps from now, as 'getMonotonicTime' tells it, until it tells the second time or a
 -- later one.
 sleepBetween :: Double -> Double -> IO ()
-sleepBetween from to = when (to > from) $ sleepTicks (tick floor from) (endOf from to)
+sleepBetween from to = when (to > from) $ sleepTicks (tick floor from) (tick ceiling (min to (forever from)))
 
 -- | Sleeps from now until the beginning of a slot, for who does that in every period, and
--- gives the time of it. That is up to a tenth of the period later than was asked for, so
--- that all who have the same period wake together, ten times in a period at most.
+-- gives the time of it.
 sleepToSlot :: Double -> Double -> Double -> IO Double
 sleepToSlot period from to = slot <$ sleepBetween from slot
  where
   slot = slotTime period from to
 
--- | When that is.
+-- | When the slot begins that was asked for: up to a tenth of the period later, so that all
+-- who have the same period wake together, ten times in a period at most.
+--
+-- (A slot is counted in tenths since the clock's beginning, and not from the slot before:
+-- what is rounded does not add up.)
 slotTime :: Double -> Double -> Double -> Double
 slotTime period from to
-  | to <= from = to
-  | otherwise = fromIntegral (upTo (tick round period) (endOf from to)) / fromIntegral aSecond
+  | to > from && to < forever from && tenth > hair = tenth * fromIntegral (ceiling ((to - hair) / tenth) :: Int)
+  | otherwise = to
  where
-  upTo ticks t
-    | fromIntegral ticks == period * fromIntegral aSecond, (tenth, 0) <- ticks `divMod` 10 = t + (-t) `mod` tenth
-    | otherwise = t
+  tenth = period / 10
+  hair = 1e-6
 
 sleepTicks :: Tick -> Tick -> IO ()
 sleepTicks from end = go from
@@ -78,9 +83,9 @@ sleepTicks from end = go from
 nextGate :: Tick -> Tick -> Tick -> Tick
 nextGate from end t = t + min (end - t) (max aSecond (t - from))
 
--- | The tick to sleep until. (A century is as good as for ever, and can be counted.)
-endOf :: Double -> Double -> Tick
-endOf from to = tick ceiling (min to (from + 3e9) - 1e-6)
+-- | A century from now is as good as for ever, and can be counted.
+forever :: Double -> Double
+forever from = from + 3e9
 
 -- | A moment, counted in eighths of a millisecond: finer than GHC's clocks can tell.
 type Tick = Int
@@ -141,14 +146,17 @@ clock t later = do
 pause :: Tick
 pause = 6
 
--- | Sleeps for about so many seconds. The system's sleep is more exact than GHC's, which
--- counts whole milliseconds, and dear to set; but only where it does not stop all threads.
+-- | Sleeps for about so many seconds; the last stretch by the system's sleep, which is more
+-- exact than GHC's, and not so dear to set. (It keeps a thread of the system busy, and
+-- where there is only one, that must not be.)
 sleepFor :: Double -> IO ()
 sleepFor seconds
-  | rtsSupportsBoundThreads && seconds < 0.5 = void (usleep (microseconds seconds))
-  | otherwise = threadDelay (microseconds (min 86400 (max 0.0001 (seconds - 0.25))))
+  | not rtsSupportsBoundThreads = threadDelay (microseconds (min aDay seconds))
+  | seconds < 0.05 = void (usleep (microseconds seconds))
+  | otherwise = threadDelay (microseconds (min aDay seconds - 0.025))
  where
   microseconds :: Integral n => Double -> n
   microseconds = ceiling . (* 1000000)
+  aDay = 86400
 
 foreign import ccall safe "usleep" usleep :: CUInt -> IO CInt

@@ -58,8 +58,7 @@ data Engine k a = Engine
 -- something else.
 react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react name signal reacting = structured $ \within -> do
-  opened <- open signal
-  alike opened (==)
+  opened <- open (distinct signal)
   begin Engine {operator = name, scope = within, source = opened, reaction = reacting} First
 
 -- | Starts the sensors.
@@ -253,7 +252,7 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
   Nothing -> Idle
   Just n -> Run ("rule " ++ show (n + 1)) (snd (rules !! n))
  where
-  firstHolding = findIndex id <$> traverse fst rules
+  firstHolding = findIndex id <$> traverse (distinct . fst) rules
 
 -- | Waits until the condition holds; returns at once if it does.
 --

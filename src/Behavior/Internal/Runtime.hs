@@ -4,7 +4,8 @@
 
 -- |
 -- The seam: all that the library does with threads, time and waiting goes through
--- this module. No other module forks, delays, throws to a thread or waits in a
+-- this module. No other module (but the clock that it sleeps by,
+-- "Behavior.Internal.Alarm") forks, delays, throws to a thread or waits in a
 -- transaction, so a simulation that takes over here has taken over everything.
 --
 -- Each operation is done in reality, or in the simulation that the calling thread

@@ -6,6 +6,7 @@ module Behavior.Internal.Source
   ( -- * Signals
     Signal (..)
   , watching
+  , distinct
   , withShared
 
     -- * Sources
@@ -21,7 +22,6 @@ module Behavior.Internal.Source
   , lost
   ) where
 
-import Control.Applicative (liftA2)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally)
 import Control.Monad (when)
@@ -86,7 +86,7 @@ instance Applicative Source where
   f <*> a =
     (viewing ((<*>) <$> view f <*> view a))
       { workers = workers f ++ workers a
-      , reading = liftA2 (liftA2 earliest) (reading f) (reading a)
+      , reading = (\s t -> earliest <$> s <*> t) <$> reading f <*> reading a
       }
    where
     earliest (Just s) (Just t) = Just (min s t)
@@ -140,6 +140,12 @@ watching transaction = Signal . pure . viewing . pure $ View value
  where
   value First = transaction
   value Later = transaction `orElse` failWith "the signal has no value any more"
+
+-- | The signal, for who does not mind if he is not told the same value twice.
+distinct :: Eq a => Signal a -> Signal a
+distinct signal = Signal $ do
+  source <- open signal
+  source <$ alike source (==)
 
 -- | Opens the sources of a signal once, for all its occurrences in a behaviour.
 --

@@ -1,0 +1,161 @@
+-- |
+-- Waking at a given time, for all who sleep.
+--
+-- Real time passes in here, but little of it; what is said of it are lower bounds, and that
+-- it ends.
+module Behavior.AlarmSpec (spec) where
+
+import Control.Concurrent (myThreadId, yield)
+import Control.Concurrent.Async
+import Control.Exception (mask_)
+import Control.Monad (replicateM, replicateM_, void, when)
+import Data.Foldable (for_)
+import Data.List (nub)
+import GHC.Clock (getMonotonicTime)
+import Test.Hspec
+import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
+import Test.QuickCheck hiding (within)
+
+import Behavior.Internal.Alarm
+import Support
+
+spec :: Spec
+spec = guarded $ do
+  describe "A slot" slots
+  describe "Who sleeps" sleepers
+  describe "Of those who sleep" many
+
+-- | The slots that follow one another, from the first that was slept to; who is so much of
+-- a period late is still in time for the next one.
+slotsOf :: Double -> Double -> Double -> [Double]
+slotsOf period late = iterate $ \slot -> slotTime period (slot + late * period) (slot + period)
+
+slots :: Spec
+slots = do
+  for_ [0.1, 0.01, 0.001, 1 / 30, 1 / 3, 0.0123, 0.07, 0.25, 1, 7.3] $ \period ->
+    it ("keeps a period of " ++ show period ++ " s, to the millisecond, for an hour") $ do
+      let first = slotTime period 4711.1234567 (4711.1234567 + period)
+          due = [first + fromIntegral k * period | k <- [0 :: Int .. ceiling (3600 / period)]]
+      take 1 [(slot, time) | (slot, time) <- zip (slotsOf period 0.01 first) due, abs (slot - time) > 0.001]
+        `shouldBe` []
+
+  prop "keeps any period, to the microsecond, for a thousand of them" $
+    forAll ((,,) <$> periods <*> choose (0, 0.99) <*> times) $ \(period, late, t) ->
+      let first = slotTime period t (t + period)
+          drift = slotsOf period late first !! 1000 - (first + 1000 * period)
+       in counterexample (show drift) $ abs drift < 1e-6
+
+  prop "begins when it was asked for, or at most a tenth of the period later" $
+    forAll ((,,) <$> periods <*> choose (0, 1) <*> times) $ \(period, ahead, t) ->
+      let to = t + ahead * period
+          slot = slotTime period t to
+       in -- (A microsecond is less than it takes to be woken.)
+          counterexample (show (slot - to)) $ slot >= to - 1e-6 && slot <= to + max 0.000125 (period / 10)
+
+  prop "is one of ten in a period, for all whose period is a round number" $
+    forAll ((,) <$> elements roundOnes <*> vectorOf 1000 times) $ \(period, ts) ->
+      let phase t = round (slotTime period t (t + period) * 8000) `mod` (round (period * 8000) :: Int)
+       in length (nub (map phase ts)) <= 10
+
+  it "that has begun already is not slept for" $
+    slotTime 0.1 5.01 5.003 `shouldBe` 5.003
+ where
+  roundOnes = [0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 7.3]
+  periods = oneof [choose (0.001, 10), elements roundOnes]
+  times = choose (0, 1000000)
+
+sleepers :: Spec
+sleepers = do
+  modifyMaxSuccess (const 5) . prop "wakes, and never before the time, among many who sleep" $
+    forAll (vectorOf 500 (choose (0, 0.02))) $ \seconds ->
+      ioProperty $ do
+        early <- forConcurrently seconds $ \s -> do
+          t <- getMonotonicTime
+          sleepBetween t (t + s)
+          subtract (t + s) <$> getMonotonicTime
+        pure (filter (< 0) early === [])
+
+  modifyMaxSuccess (const 5) . prop "for a slot wakes, and never before it begins" $
+    forAll (vectorOf 100 (choose (0.001, 0.02))) $ \periods ->
+      ioProperty $ do
+        early <- forConcurrently periods $ \period -> do
+          t <- getMonotonicTime
+          slot <- sleepToSlot period t (t + period)
+          subtract slot <$> getMonotonicTime
+        pure (filter (< 0) early === [])
+
+  it "until an earlier time than all others wakes before them" $
+    replicateM_ 3 . eventually $ do
+      -- (If the machine has slept too long itself, that says nothing: then once more.)
+      t <- getMonotonicTime
+      launching (sleepBetween t (t + 0.1)) $ \other -> do
+        awaitIdle (asyncThreadId other)
+        t' <- getMonotonicTime
+        sleepBetween t' (t' + 0.001)
+        woken <- getMonotonicTime
+        awaitEnd other `shouldReturn` Gave ()
+        pure (woken < t + 0.1)
+
+  it "can be interrupted: it is gone at once, and the others of the same moment wake" $ do
+    t <- getMonotonicTime
+    let to = t + 0.05
+    sleeping <- replicateM 5 (async (sleepBetween t to >> getMonotonicTime))
+    for_ sleeping (awaitIdle . asyncThreadId)
+    let (interrupted, others) = splitAt 3 sleeping
+    for_ interrupted cancel
+    for_ others $ \other -> do
+      woken <- wait other
+      woken `shouldSatisfy` (>= to)
+
+  it "for ever can be interrupted" $ do
+    t <- getMonotonicTime
+    for_ [sleepBetween t (1 / 0), void (sleepToSlot (1 / 0) t (1 / 0))] $ \act ->
+      launching act $ \sleeper -> do
+        awaitIdle (asyncThreadId sleeper)
+        stillRunning sleeper
+        cancel sleeper
+
+  for_ [0, -1, -1 / 0] $ \seconds ->
+    it ("for " ++ show seconds ++ " s does not wait: nothing can come in between") $ do
+      book <- newNotebook
+      let act = mask_ $ do
+            self <- myThreadId
+            throwing self (Cancel "the sleeper")
+            t <- getMonotonicTime
+            sleepBetween t (t + seconds)
+            _ <- sleepToSlot 0.01 t (t + seconds)
+            note book "went on"
+      _ <- launching act awaitEnd
+      notes book `shouldReturn` ["went on"]
+
+many :: Spec
+many = do
+  it "none is forgotten, however many come and go" $ do
+    lengths <- generate (vectorOf 1000 (vectorOf 20 (choose (0, 0.002))))
+    forConcurrently_ lengths . mapM_ $ \s ->
+      getMonotonicTime >>= \t -> sleepBetween t (t + s)
+
+  it "none is forgotten when others who wanted to wake at the same times are interrupted" $ do
+    lengths <- generate (vectorOf 200 (vectorOf 10 (choose (0, 0.002))))
+    (`mapConcurrently_` lengths) . mapM_ $ \s -> do
+      t <- getMonotonicTime
+      launching (sleepBetween t (t + s)) $ \_ -> sleepBetween t (t + s / 2)
+      sleepBetween t (t + s)
+
+  it "none is forgotten when others are interrupted just as they lie down" $
+    for_ [1 .. 300 :: Int] $ \n -> do
+      t <- getMonotonicTime
+      for_ [1 .. 10] $ \k ->
+        launching (sleepBetween t (t + 0.002 - k / 8000)) $ \_ ->
+          replicateM_ (n `mod` 7) yield
+      when (n `mod` 10 == 0) $ sleepBetween t (t + 0.003)
+
+  -- (Who is interrupted leaves something behind until the gate opens.)
+  prop "nobody waits at a gate that is farther away than he has slept, or than a second" $
+    forAll ((,) <$> choose (0, maxBound `div` 4) <*> oneof [choose (1, 100000), choose (1, maxBound `div` 4)]) $ \(from, long) ->
+      let end = from + long
+          gates = takeWhile (< end) (take 100 (iterate (nextGate from end) from)) ++ [end]
+          far = [gate - t | (t, gate) <- zip gates (drop 1 gates), gate - t > max second (t - from)]
+       in counterexample (show gates) $ far === [] .&&. length gates < 64
+ where
+  second = 8000
