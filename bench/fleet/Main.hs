@@ -4,12 +4,14 @@
 -- What a fleet costs: many agents in one process. A line for each figure.
 module Main (main) where
 
-import Control.Concurrent (forkIO, runInUnboundThread)
+import Control.Concurrent
 import Control.Concurrent.STM (check, newTVarIO, readTVar, retry, writeTVar)
 import qualified Control.Concurrent.STM as STM
-import Control.Monad (replicateM, replicateM_, void)
+import Control.Exception (throwIO)
+import Control.Monad (forever, replicateM, replicateM_, void, when)
 import Data.Foldable (for_)
 import Data.IORef (newIORef, readIORef)
+import Data.Traversable (for)
 import Foreign (advancePtr, callocArray, peek, peekArray, poke)
 import System.Environment (getArgs)
 import System.Exit (die)
@@ -29,8 +31,9 @@ main =
       ["together", n] -> idle "fleet together" together (read n)
       ["bare", n] -> bare (read n)
       ["polled", n] -> asked "fleet polled" (\low -> Signal.monitor low (pure ())) (read n)
+      ["woken", n] -> woken (read n)
       ["waiting", n] -> asked "fleet waited" (\low _ -> Signal.waitUntil low) (read n)
-      _ -> die "usage: fleet (idle | together | bare | polled | waiting) AGENTS"
+      _ -> die "usage: fleet (idle | together | bare | polled | waiting | woken) AGENTS"
  where
   -- Agents that come and go each by itself; and those of one behaviour.
   apart missions measure = for_ missions forkIO >> measure
@@ -83,21 +86,40 @@ atRest name n before begun waiting = do
 
 -- | Agents that each ask a sensor ten times a second.
 asked :: String -> (Signal.Signal Bool -> Behavior () -> Behavior ()) -> Int -> IO ()
-asked name operator n = do
+asked name operator n = readings name n $ \sensors measure ->
+  void (allOf [operator ((< 10) <$> Signal.polling 0.1 sensor) (STM.atomically retry) | sensor <- sensors]) ||| measure
+
+-- | The least that a thread for each sensor can cost: somebody else looks at the clock, and
+-- fills a variable for each, ten times a second.
+woken :: Int -> IO ()
+woken n = readings "bare fleet" n $ \sensors measure -> do
+  -- (Like ours, each compares what it has read.)
+  ticks <- for sensors $ \sensor -> do
+    tick <- newEmptyMVar
+    _ <- forkIO . forever $ do
+      takeMVar tick
+      low <- (< 10) <$> sensor
+      when low (throwIO (userError "the battery is low"))
+    pure tick
+  _ <- forkIO . forever $ for_ ticks (`tryPutMVar` ()) >> threadDelay 100000
+  measure
+
+-- | Tells what a reading costs, and how many of those that are due are made, of so many
+-- sensors.
+readings :: String -> Int -> ([IO Int] -> IO () -> IO ()) -> IO ()
+readings name n alongside = do
   level <- newIORef (50 :: Int)
   -- Each counts in a place of its own, which only its own sensor's thread writes.
   counts <- callocArray n
-  let agent i = operator ((< 10) <$> Signal.polling 0.1 (readSensor (advancePtr counts i))) (STM.atomically retry)
-      readSensor count = (peek count >>= poke count . (+ 1)) >> readIORef level
+  let readSensor count = (peek count >>= poke count . (+ 1)) >> readIORef level
       made = sum <$> peekArray n counts :: IO Int
-      measure = do
-        -- Until the start is over.
-        sleep 1
-        (t0, cpu0, made0) <- (,,) <$> time <*> processorTime <*> made
-        sleep 3
-        (t1, cpu1, made1) <- (,,) <$> time <*> processorTime <*> made
-        let readings = fromIntegral (made1 - made0)
-            due = fromIntegral n * (t1 - t0) / 1e8
-        line (name ++ " reading " ++ show n) ((cpu1 - cpu0) / readings)
-        line (name ++ " kept " ++ show n) (readings / due)
-  void (allOf (map agent [0 .. n - 1])) ||| measure
+  alongside (map (readSensor . advancePtr counts) [0 .. n - 1]) $ do
+    -- Until the start is over.
+    sleep 1
+    (t0, cpu0, made0) <- (,,) <$> time <*> processorTime <*> made
+    sleep 3
+    (t1, cpu1, made1) <- (,,) <$> time <*> processorTime <*> made
+    let readings' = fromIntegral (made1 - made0)
+        due = fromIntegral n * (t1 - t0) / 1e8
+    line (name ++ " reading " ++ show n) ((cpu1 - cpu0) / readings')
+    line (name ++ " kept " ++ show n) (readings' / due)

@@ -2,28 +2,34 @@
 
 -- |
 -- How long it takes from the change of a condition to the first step of the recovery, and,
--- to compare, to the first step of a thread that waits for nothing but that change. A line
+-- to compare, to the first step of a thread that waits for nothing but that change: while
+-- nothing else goes on, or other agents wait, or another thread computes without end. A line
 -- for each figure, in microseconds.
 module Main (main) where
 
 import Control.Concurrent
   ( MVar
   , forkIO
+  , forkOn
   , getNumCapabilities
+  , myThreadId
   , newEmptyMVar
   , putMVar
   , runInUnboundThread
   , takeMVar
+  , threadCapability
   )
 import Control.Concurrent.STM (TVar, check, newTVarIO, readTVar, writeTVar)
 import qualified Control.Concurrent.STM as STM
-import Control.Monad (forever, replicateM, replicateM_, when)
+import Control.Exception (evaluate)
+import Control.Monad (forever, replicateM_, when)
 import Data.Foldable (for_)
 import Data.IORef (IORef, newIORef, readIORef, writeIORef)
 import Data.List (sort)
 import Foreign.C.Types (CInt (..), CUInt (..))
 import System.Environment (getArgs)
 import System.Exit (die)
+import Text.Read (readMaybe)
 
 import Agent
 import Behavior
@@ -44,11 +50,29 @@ main :: IO ()
 main =
   runInUnboundThread $
     getArgs >>= \case
-      [who] | Just reacts <- lookup who reactors -> measured who "" reacts
-      [who, n] | Just reacts <- lookup who reactors -> crowd (read n) >> measured who (" among " ++ n) reacts
-      _ -> die "usage: reaction (ours | bare) [AGENTS]"
+      who : others | Just reacts <- lookup who reactors -> meanwhile others >>= measured who reacts
+      _ -> usage
  where
   reactors = [("ours", ours), ("bare", bare)]
+
+-- | Begins what goes on meanwhile, and gives what the figures are called by.
+meanwhile :: [String] -> IO String
+meanwhile = \case
+  [] -> processors
+  [kind] | Just computation <- lookup kind computations -> do
+    -- Not where this thread is, and all that it starts, if there is another capability.
+    -- (The first is not always this one's.)
+    (mine, _) <- threadCapability =<< myThreadId
+    _ <- forkOn (mine + 1) computation
+    ((kind ++ " ") ++) <$> processors
+  [n] | Just agents <- readMaybe n -> ("among " ++ n) <$ crowd agents
+  _ -> usage
+ where
+  processors = ("N" ++) . show <$> getNumCapabilities
+  computations = [("busy", searching), ("counting", counting)]
+
+usage :: IO a
+usage = die "usage: reaction (ours | bare) [AGENTS | busy | counting]"
 
 -- | Interrupts a sleeping task.
 ours :: Stage -> IO ()
@@ -70,8 +94,8 @@ reaction stage = do
   STM.atomically (writeTVar (flag stage) False)
 
 -- | Changes the condition again and again, whenever all has been quiet for a moment.
-measured :: String -> String -> (Stage -> IO ()) -> IO ()
-measured who among reacts = do
+measured :: String -> (Stage -> IO ()) -> String -> IO ()
+measured who reacts beside = do
   stage <- Stage <$> newTVarIO False <*> newEmptyMVar <*> newIORef 0
   _ <- forkIO (reacts stage)
   takeMVar (ready stage)
@@ -82,13 +106,21 @@ measured who among reacts = do
         takeMVar (ready stage)
         reacted <- readIORef (noted stage)
         pure ((reacted - changed) / 1000)
-  replicateM_ 500 sample
-  sorted <- sort <$> replicateM 8000 sample
-  processors <- case among of
-    "" -> (" N" ++) . show <$> getNumCapabilities
-    _ -> pure among
+  _ <- during 0.2 sample
+  sorted <- sort <$> during 3 sample
   for_ [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999)] $ \(name, part) ->
-    line ("reaction" ++ processors ++ " " ++ name ++ " " ++ who) (quantile part sorted)
+    line (unwords ["reaction", beside, name, who]) (quantile part sorted)
+
+-- | Does it again and again, for so many seconds. In a loop that needs no stack: the runtime
+-- looks through the stack of a thread that waits, before the next one runs.
+during :: Double -> IO a -> IO [a]
+during seconds act = do
+  begun <- time
+  let go results = do
+        result <- act
+        over <- (> begun + seconds * 1e9) <$> time
+        (if over then pure else go) (result : results)
+  go []
 
 -- | Waits as the driver of a device does: outside of the runtime, all of whose threads are
 -- idle meanwhile, and without its timers, which the sleeping task may use too.
@@ -100,3 +132,25 @@ crowd n = when (n > 0) $ do
   waiting <- musterOf n
   replicateM_ n (newAgent >>= \agent -> forkIO (mission agent (arrive waiting)))
   complete waiting
+
+-- | A search, which allocates all the time, and keeps little: all ways to place the queens.
+searching :: IO ()
+searching = for_ (cycle [6, 7, 8]) $ evaluate . length . queens
+
+queens :: Int -> [[Int]]
+queens n = go n
+ where
+  go 0 = [[]]
+  go k = [q : others | others <- go (k - 1 :: Int), q <- [1 .. n], and (zipWith (apart q) others [1 ..])]
+  apart q other distance = q /= other && abs (q - other) /= distance
+
+-- | A calculation that hardly allocates: it can be interrupted every few microseconds.
+counting :: IO ()
+counting = for_ [1 ..] $ evaluate . steps 10000
+
+-- | The numbers of a generator.
+steps :: Int -> Int -> Int
+steps n seed
+  | n == 0 = seed
+  | otherwise = steps (n - 1) (seed * 6364136223846793005 + 1442695040888963407)
+{-# NOINLINE steps #-}

@@ -11,7 +11,7 @@ import Row
 promises :: [Group]
 promises =
   [trying, together, reacting, manyBranches, rules, standingStill, longPrograms]
-    ++ [reactions, idleFleet, fleetBytes, fleetTime]
+    ++ [reactions, besideComputation, idleFleet, fleetBytes, fleetTime]
     ++ [seamTime, seamBytes, simulator, simulatedDay]
 
 -- What the operators cost, beside what does the same by hand, or as behaviour trees do it.
@@ -74,21 +74,37 @@ operators title = Group title "-N1 -A4m"
 
 reactions :: Group
 reactions =
-  Group "A condition changes, its recovery starts: microseconds" "-N1, -N2 -qm" $
+  Group "A condition changes, its recovery starts: microseconds" "-I0 -A16m -qm, with -N1 or -N2" $
     concat
-      [ [ measured n share "ours" `within` bound `times` measured n share "bare"
+      [ [ reaction n share "ours" `within` bound `times` reaction n share "bare"
         | n <- ["N1", "N2"]
         , (share, bound) <- [("p50", 2), ("p99", 3), ("p99.9", 5)]
         ]
-      , [ measured n share "ours" `atMost` bound
+      , [ reaction n share "ours" `atMost` bound
         | (n, share, bound) <- [("N1", "p50", 5), ("N1", "p99", 50), ("N2", "p50", 16), ("N2", "p99", 106)]
         ]
       , ["reaction among 100000 p99 ours" `within` 5 `times` "reaction among 0 p99 ours"]
       ]
- where
-  measured n share whose = fromString (unwords ["reaction", n, share, whose])
 
--- A fleet of agents in one process.
+-- Where there are two capabilities, the computation has one of them for itself. Where there
+-- is one, a thread that is woken waits until the computation's turn is over, and ours are
+-- three, one after the other.
+
+besideComputation :: Group
+besideComputation =
+  Group "The same beside a computation without end: microseconds" "-I0 -A16m -qm, with -N2 or -N1 -C0.001" $
+    [ reaction (load ++ " N2") share "ours" `within` bound `times` reaction "N2" share "ours"
+    | load <- ["busy", "counting"]
+    , (share, bound) <- [("p50", 2), ("p99", 5), ("p99.9", 5)]
+    ]
+      ++ [told (reaction setting share whose) | (setting, whose) <- others, share <- ["p50", "p99"]]
+ where
+  others = [("busy N2", "bare"), ("busy N1", "ours"), ("busy N1", "bare")]
+
+reaction :: String -> String -> String -> Figure
+reaction setting share whose = fromString (unwords ["reaction", setting, share, whose])
+
+-- A fleet of agents in one process. What is bare is the least that as many threads cost.
 
 idleFleet, fleetBytes, fleetTime :: Group
 idleFleet =
@@ -98,17 +114,22 @@ idleFleet =
 fleetBytes =
   fleet
     "A fleet: bytes an agent"
-    ["fleet bytes 100000" `within` 1 `times` "bonsai fleet bytes 100000"]
+    [ "fleet bytes 100000" `within` 1 `times` "bonsai fleet bytes 100000"
+    , told "bare fleet bytes 100000"
+    ]
 fleetTime =
   fleet
     "A fleet: nanoseconds an agent or a reading"
     [ "fleet creation 100000" `within` 1 `times` "bonsai fleet creation 100000"
+    , told "bare fleet creation 100000"
     , "fleet polled reading 10000" `within` 1 `times` "bonsai fleet tick 10000"
+    , told "bare fleet reading 10000"
     , "fleet polled reading 100000" `within` 1 `times` "bonsai fleet tick 100000"
+    , told "bare fleet reading 100000"
     ]
 
 fleet :: String -> [Row] -> Group
-fleet title = Group title "-N1"
+fleet title = Group title "-N1 -I0 -A1g -ki768 -kc4k"
 
 -- What it costs that the operators can be simulated: with the switch and without.
 
