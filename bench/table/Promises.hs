@@ -135,25 +135,22 @@ fleet title = Group title "-N1 -I0 -A1g -ki768 -kc4k"
 
 seamTime, seamBytes :: Group
 seamTime =
-  Group "The seam, the shortest round: nanoseconds" "-N1" (seam "ns")
+  Group "The seam, the shortest round: nanoseconds" "-N1" (seam "ns" switched)
 seamBytes =
-  Group "The seam, the shortest round: bytes allocated" "-N1" (seam "bytes")
+  Group "The seam, the shortest round: bytes allocated" "-N1" (seam "bytes" (unswitched ++ switched))
 
-seam :: String -> [Row]
-seam unit =
+seam :: String -> [String] -> [Row]
+seam unit operators' =
   [ shortest (switch "with") `within` 1.1 `times` shortest (switch "without")
-  | operator <-
-      [ "? that succeeds"
-      , "? that fails"
-      , "atomically"
-      , "parallel"
-      , "both"
-      , "allOf 10"
-      , "monitor, watched"
-      , "monitor, polled"
-      ]
+  | operator <- operators'
   , let switch present = fromString (unwords ["seam", present, unit ++ ":", operator])
   ]
+
+-- | Those that go through the seam; the others take four nanoseconds, and how the code
+-- happens to lie makes more of a difference.
+switched, unswitched :: [String]
+switched = ["atomically", "parallel", "both", "allOf 10", "monitor, watched", "monitor, polled"]
+unswitched = ["? that succeeds", "? that fails"]
 
 -- How fast the simulator is.
 
