@@ -32,6 +32,7 @@
 --      0.000 s  2 both: right  transaction
 --      0.000 s  2 both: right  ends
 --      0.000 s  1 both: left   ends
+--      0.000 s  0 main         transaction
 -- to see it again: explore (replaying (Switching [(5,2)]))
 --
 -- The same behaviours are simulated that run on the robot: plain 'IO', whose waiting goes
