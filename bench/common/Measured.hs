@@ -29,7 +29,7 @@ import System.IO (hFlush, stdout)
 
 -- | A line for each figure: its name, a tabulator, and the figure as a plain decimal.
 line :: String -> Double -> IO ()
-line name value = putStrLn (name ++ "\t" ++ showFFloat (Just 5) value "") >> hFlush stdout
+line name value = putStrLn (name ++ "\t" ++ showFFloat (Just 7) value "") >> hFlush stdout
 
 -- | What the clock shows, in nanoseconds.
 time :: IO Double

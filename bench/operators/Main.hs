@@ -12,7 +12,6 @@ import Control.Concurrent.STM (TVar, newTVarIO, readTVar, writeTVar)
 import Control.Exception (throwIO, try)
 import Control.Monad (forM_, replicateM, replicateM_, void, when)
 import Data.IORef (IORef, newIORef, readIORef, writeIORef)
-import System.CPUTime (getCPUTime)
 import System.Environment (getArgs)
 import System.Exit (die)
 import System.Mem (performMajorGC)
@@ -20,7 +19,8 @@ import System.Mem (performMajorGC)
 import Behavior
 import Behavior.Parallel (allOf, firstOf)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, now)
+import Behavior.Time (atomically)
+import Measured
 
 main :: IO ()
 main =
@@ -151,10 +151,10 @@ measure :: Case -> IO ()
 measure (Case name times act) = do
   act (times `div` 10)
   performMajorGC
-  begun <- now
+  begun <- time
   act times
-  ended <- now
-  report name (realToFrac (ended - begun) * 1e9 / fromIntegral times)
+  ended <- time
+  line name ((ended - begun) / fromIntegral times)
 
 -- | Seconds of the processor's time in a second in which nothing changes.
 measureIdle :: Int -> IO ()
@@ -164,12 +164,9 @@ measureIdle rules = do
     -- For some time after anything has run, now and at the end, the runtime's clock ticks
     -- and it collects its garbage.
     threadDelay 500000
-    before <- getCPUTime
+    before <- processorTime
     threadDelay 4000000
-    after <- getCPUTime
-    report ("teleoReactive idle cpu " ++ show rules) (fromIntegral (after - before) / 4e12)
+    after <- processorTime
+    line ("teleoReactive idle cpu " ++ show rules) ((after - before) / 4e9)
   -- In reach to the end.
   forM_ flags (`set` True)
-
-report :: String -> Double -> IO ()
-report name value = putStrLn (name ++ "\t" ++ show value)

@@ -9,7 +9,8 @@ import Control.Monad (forM_)
 import Behavior
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
-import Behavior.Time (atomically, checkpoint, now)
+import Behavior.Time (atomically, checkpoint)
+import Measured
 
 main :: IO ()
 main = runInUnboundThread $ do
@@ -25,7 +26,7 @@ main = runInUnboundThread $ do
   perSecond "random schedules of a small mission" $
     length <$> mapM scheduledBy [1 .. 5000]
   (_, day) <- timed (simulate aDay)
-  report "a simulated day" day
+  line "a simulated day" day
  where
   tireless = defaults {standstill = maxBound}
   scheduledBy seed = simulateWith defaults {scheduled = Seeded seed} mission
@@ -44,14 +45,12 @@ mission = do
 perSecond :: String -> IO Int -> IO ()
 perSecond name act = do
   (n, seconds) <- timed act
-  report name (fromIntegral n / seconds)
+  line name (fromIntegral n / seconds)
 
+-- | Also how many seconds it took.
 timed :: IO a -> IO (a, Double)
 timed act = do
-  begun <- now
+  begun <- time
   a <- act
-  ended <- now
-  pure (a, realToFrac (ended - begun))
-
-report :: String -> Double -> IO ()
-report name figure = putStrLn (name ++ "\t" ++ show figure)
+  ended <- time
+  pure (a, (ended - begun) / 1e9)

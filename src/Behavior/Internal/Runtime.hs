@@ -220,9 +220,9 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
 -- What the glance gives must be what the wait would have given, at some moment meanwhile:
 -- it should look at one variable only. (In a simulation there is no glance.)
 unlessAtAGlance :: IO (Maybe a) -> IO a -> IO a
-unlessAtAGlance glance waiting = inSimulation really (const waiting)
+unlessAtAGlance glance waiting = inSimulation twice (const (pure Nothing)) >>= maybe waiting pure
  where
-  really = glance >>= maybe (yield >> glance >>= maybe waiting pure) pure
+  twice = glance >>= maybe (yield >> glance) (pure . Just)
 
 -- | A wait that nothing can interrupt; for the end of threads that were asked to stop.
 -- GHC's deadlock detector is not heeded: it takes a thread that waits for a cleanup which
