@@ -99,6 +99,8 @@ subtle =
       }
   , -- A reading ends just as it is overdue.
     alone (WaitUntil (StaleAfter 2 (Polled 3 (act 2 "s" (Succeeds 1) StopsAtOnce))))
+  , -- Branch and sensor fault together, and the sensor stands first, whichever thread is older.
+    alone (RSelect (Polled 1 (act 1 "s" (Succeeds 1) (EndsAfter 0 Faults))) (act 1 "l" Faults StopsAtOnce) (act 1 "r" Fails StopsAtOnce))
   , -- The answer is there just as time is up.
     alone (Timeout 2 (Scoped (Await (act 2 "a" (Succeeds 1) StopsAtOnce) (act 1 "b" (Succeeds 2) StopsAtOnce))))
   , -- It completes although asked to stop, and is asked again.

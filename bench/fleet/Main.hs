@@ -15,6 +15,7 @@ import Data.Traversable (for)
 import Foreign (advancePtr, callocArray, peek, peekArray, poke)
 import System.Environment (getArgs)
 import System.Exit (die)
+import System.Mem (performMajorGC)
 
 import Agent
 import Behavior
@@ -114,7 +115,9 @@ readings name n alongside = do
   let readSensor count = (peek count >>= poke count . (+ 1)) >> readIORef level
       made = sum <$> peekArray n counts :: IO Int
   alongside (map (readSensor . advancePtr counts) [0 .. n - 1]) $ do
-    -- Until the start is over.
+    -- Until the start is over, and what it left is out of the way.
+    sleep 1
+    performMajorGC
     sleep 1
     (t0, cpu0, made0) <- (,,) <$> time <*> processorTime <*> made
     sleep 3

@@ -183,14 +183,20 @@ counting = do
         level <- newSensor (const getMaskingState)
         masked (Signal.switch (sensing level) pure) `shouldReturn` Unmasked
 
-  it "readings run in one thread, with a label" $ do
+  it "the first reading runs in a thread, and those after it in another, with a label" $ do
     events <- newNotebook
     threads <- newNotebook
     level <- newSensor $ \n -> (n > 5) <$ (myThreadId >>= note threads)
     reportingTo (note events) (Signal.waitUntil (sensing level))
     notes events
-      `shouldReturn` [f (Label "waitUntil" "polling") | f <- [Started, Ended]]
-    notes threads >>= (`shouldSatisfy` (== 1) . length . group)
+      `shouldReturn` concat (replicate 2 [f (Label "waitUntil" "polling") | f <- [Started, Ended]])
+    map length . group <$> notes threads `shouldReturn` [1, 5]
+
+  it "who needs but one reading starts but one thread" $ do
+    events <- newNotebook
+    level <- newSensor (const (pure True))
+    reportingTo (note events) (Signal.waitUntil (sensing level))
+    notes events `shouldReturn` [f (Label "waitUntil" "polling") | f <- [Started, Ended]]
 
 -- | A monitor that has a polled sensor and an alarm, which alone decides; whose task
 -- is under way, and whose sensor is just being read, once the gate is open. From then

@@ -103,8 +103,8 @@ react :: forall k a. Eq k => Maybe Flaw -> String -> Signal k -> (k -> Reaction 
 react flaw operator signal reaction = structured flaw operator $ \scope -> do
   source <- open signal
   let begin moment = do
-        (works, seen) <- atomically ((,) <$> traverse work (workers source) <*> view source)
-        sensors <- for (zip (workers source) works) (\(w, act) -> worker scope (workerName w) act)
+        (works, seen) <- atomically ((,) <$> traverse (sequenceA . ceaseless) (workers source) <*> view source)
+        sensors <- for works (uncurry (worker scope))
         choose sensors seen moment
 
       choose :: [Branch ()] -> View k -> Moment -> IO (IO a)

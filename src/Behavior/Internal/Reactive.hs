@@ -64,35 +64,39 @@ react name signal reacting = structured $ \within -> do
 -- | Starts the sensors.
 begin :: Eq k => Engine k a -> Moment -> IO (IO a)
 begin engine moment = do
-  (seen, sensors) <- startWorkers (scope engine) (operator engine) (source engine)
+  (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
   choose engine sensors seen moment
 
 -- | Nothing runs: reads, and does what the value says now.
-choose :: Eq k => Engine k a -> [Branch ()] -> View k -> Moment -> IO (IO a)
+choose :: Eq k => Engine k a -> Sensors -> View k -> Moment -> IO (IO a)
 choose engine sensors seen moment =
   observe (attend sensors (look seen moment)) >>= obey engine sensors (look seen Later)
 
-obey :: Eq k => Engine k a -> [Branch ()] -> STM k -> Either SomeException k -> IO (IO a)
+obey :: Eq k => Engine k a -> Sensors -> STM k -> Either SomeException k -> IO (IO a)
 obey engine sensors value = \case
   Left dead -> pure (throwIO dead)
   Right old -> case reaction engine old of
     Conclude verdict -> pure verdict
     RunToEnd name recovery -> do
-      askWithoutWaiting (map SomeBranch sensors)
+      askWithoutWaiting (sensorBranches sensors)
       recover engine sensors name recovery Nothing
-    Idle -> observe (attend sensors (changed old)) >>= obey engine sensors value
+    Idle -> do
+      awake <- goOn (scope engine) sensors
+      observe (attend awake (changed old)) >>= obey engine awake value
     Run name act -> do
       running <- branch (scope engine) (Label (operator engine) name) act
       -- The branch is looked at first: one that has ended by itself is not
       -- interrupted, whatever the signal says in the same transaction.
-      event <-
-        unlessAtAGlance (fmap (Right . Left) <$> outcomeNow running) . observe $
-          outcomeSoFar running
-            >>= maybe (fmap Right <$> attend sensors (changed old)) (pure . Right . Left)
-      case event of
-        Right (Left end) -> pure (settle end)
-        Right (Right new) -> interrupt engine sensors running (reaction engine new)
-        Left dead -> interrupt engine sensors running (Conclude (throwIO dead))
+      unlessAtAGlance (fmap settle <$> outcomeNow running) $ do
+        awake <- goOn (scope engine) sensors
+        event <-
+          observe $
+            outcomeSoFar running
+              >>= maybe (fmap Right <$> attend awake (changed old)) (pure . Right . Left)
+        case event of
+          Right (Left end) -> pure (settle end)
+          Right (Right new) -> interrupt engine awake running (reaction engine new)
+          Left dead -> interrupt engine awake running (Conclude (throwIO dead))
  where
   changed old = do
     new <- value
@@ -101,20 +105,20 @@ obey engine sensors value = \case
 
 -- | What is to come comes if the branch stops as it is asked to. If it completes all
 -- the same, it has completed, and that is the end.
-interrupt :: Eq k => Engine k a -> [Branch ()] -> Branch a -> Reaction a -> IO (IO a)
+interrupt :: Eq k => Engine k a -> Sensors -> Branch a -> Reaction a -> IO (IO a)
 interrupt engine sensors running = \case
   Conclude verdict ->
-    stopping (sensors `and'` running) >>= \case
+    stopping (sensorBranches sensors) >>= \case
       Stopped _ -> pure verdict
       end -> pure (settle end)
   RunToEnd name recovery ->
-    stopping (sensors `and'` running) >>= \case
+    stopping (sensorBranches sensors) >>= \case
       Completed a -> pure (pure a)
       Stopped _ -> forget (scope engine) running >> recover engine sensors name recovery Nothing
       -- A cleanup that went wrong must not keep the robot from its charger.
       wrong -> recover engine sensors name recovery (Just (settle wrong))
   _ ->
-    stopping ([] `and'` running) >>= \case
+    stopping [] >>= \case
       -- Read again: by now the value may be another, or the old one again.
       Stopped _ -> do
         forget (scope engine) running
@@ -122,12 +126,11 @@ interrupt engine sensors running = \case
         choose engine sensors seen Later
       end -> pure (settle end)
  where
-  others `and'` b = map SomeBranch others ++ [SomeBranch b]
-  stopping branches = ask branches >> ended running
+  stopping others = ask (others ++ [SomeBranch running]) >> ended running
 
 -- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
 -- those that are slow to, but what comes after it does.
-recover :: Eq k => Engine k a -> [Branch ()] -> String -> Behavior () -> Maybe (IO a) -> IO (IO a)
+recover :: Eq k => Engine k a -> Sensors -> String -> Behavior () -> Maybe (IO a) -> IO (IO a)
 recover engine sensors name recovery aftermath = do
   recovered <- branch (scope engine) (Label (operator engine) name) recovery
   end <- ended recovered
@@ -136,12 +139,14 @@ recover engine sensors name recovery aftermath = do
     (Left wrong, Nothing) -> pure (throwIO wrong)
     (Right (), Nothing) -> do
       forget (scope engine) recovered
-      rested <- traverse (rest (scope engine)) sensors
+      rested <- traverse (rest (scope engine)) (sensorBranches sensors)
       if and rested then begin engine Later else pure (failWith "a sensor faulted")
 
 -- | Looks at a value, and first at the sensors that it comes from.
-attend :: [Branch ()] -> STM a -> STM (Either SomeException a)
-attend sensors value = foldr (\sensor others -> lost sensor >>= maybe others (pure . Left)) (Right <$> value) sensors
+attend :: Sensors -> STM a -> STM (Either SomeException a)
+attend sensors value = foldr orLost (Right <$> value) (sensorBranches sensors)
+ where
+  orLost (SomeBranch sensor) others = lost sensor >>= maybe others (pure . Left)
 
 -- | Waits for a transaction; what it throws is a sensor's.
 observe :: STM (Either SomeException a) -> IO (Either SomeException a)
@@ -149,8 +154,8 @@ observe = fmap join . trySynchronous . atomically
 
 -- | Waits until a branch that was asked to stop has ended. If it faulted it stays
 -- in the scope, which throws its fault.
-rest :: Scope -> Branch () -> IO Bool
-rest within sensor =
+rest :: Scope -> SomeBranch -> IO Bool
+rest within (SomeBranch sensor) =
   ended sensor >>= \case
     Faulted _ -> pure False
     _ -> True <$ forget within sensor

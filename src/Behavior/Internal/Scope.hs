@@ -29,6 +29,7 @@ module Behavior.Internal.Scope
   , branch
   , branchThen
   , worker
+  , successor
   , forget
   , ask
   , askWithoutWaiting
@@ -154,23 +155,36 @@ branchThen then' scope label act = launch scope (\_ -> startThen then' label act
 worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
 worker scope label act = launch scope (start label . act)
 
+-- | Starts a worker that goes on for a branch that has ended, in its place: what is
+-- left and right of it stays so.
+successor :: Scope -> Branch b -> Label -> (IO Bool -> IO a) -> IO (Branch a)
+successor scope old label act = launchAs (\new -> instead old [new]) scope (start label . act)
+
 launch :: Scope -> (IO Bool -> IO (Thread a)) -> IO (Branch a)
-launch (Scope branches) starting = mask_ $ do
+launch = launchAs (:)
+
+launchAs :: (SomeBranch -> [SomeBranch] -> [SomeBranch]) -> Scope -> (IO Bool -> IO (Thread a)) -> IO (Branch a)
+launchAs into (Scope branches) starting = mask_ $ do
   asked <- newIORef False
   thread <- starting (readIORef asked)
   let new = Branch {branchThread = thread, branchAsked = asked}
-  modifyIORef' branches (SomeBranch new :)
+  modifyIORef' branches (into (SomeBranch new))
   pure new
+{-# INLINE launchAs #-}
 
 -- | Takes a branch that has ended, and did not fault, out of the scope, which
 -- otherwise would grow with every branch that an operator ever started.
 forget :: Scope -> Branch a -> IO ()
-forget (Scope branches) old = modifyIORef' branches without
+forget (Scope branches) old = modifyIORef' branches (instead old [])
+
+-- | The branches, with these in place of one.
+instead :: Branch a -> [SomeBranch] -> [SomeBranch] -> [SomeBranch]
+instead old new = without
  where
   -- Strict: an unevaluated list would hold on to what was taken out of it.
   without [] = []
   without (SomeBranch b : others)
-    | branchId b == branchId old = others
+    | branchId b == branchId old = new ++ others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
 -- | Asks branches to stop, all at once: none hears it later because another cannot

@@ -9,7 +9,7 @@ module Behavior.Internal.Sensor
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (evaluate, throwIO)
-import Control.Monad (forever, when)
+import Control.Monad (forever, void, when)
 import Data.IORef (newIORef, readIORef, writeIORef)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
@@ -51,7 +51,7 @@ polling every act = Signal $ do
   underWay <- newTVarIO Nothing -- the slot of the reading that is under way
   telling <- newIORef False -- whether somebody wants to know of that
   same <- newIORef (\_ _ -> False)
-  let readFrom t planned told asked = do
+  let readFrom once t planned told asked = do
         slot <- sleepToSlot every t planned
         writeIORef begun (Just slot)
         tells <- readIORef telling
@@ -62,7 +62,7 @@ polling every act = Signal $ do
         if stopping
           then -- The reading is not wanted any more, and may have swallowed the
           -- request to stop. A fault of its cleanup is not lost.
-            either throwIO (const (pure ())) read'
+            either throwIO (const (pure (const (pure ())))) read'
           else do
             isNews <- case (told, read') of
               -- (Who asked for a view meanwhile wants to hear it, whatever it is.)
@@ -71,9 +71,13 @@ polling every act = Signal $ do
             when (isNews || tells) . atomically $ do
               when isNews (writeTVar newest (Just (asking, read')))
               when tells (writeTVar underWay Nothing)
-            t' <- now
-            let next = slotAfter (slot + every) t'
-            next `seq` readFrom t' next (if isNews then either (const Untold) (Told asking) read' else told) asked
+            let told'
+                  | isNews = either (const Untold) (Told asking) read'
+                  | otherwise = told
+                onwards asked' = do
+                  t' <- now
+                  readFrom False t' (slotAfter (slot + every) t') told' asked'
+            if once then pure (void . onwards) else onwards asked
       differs old new = do
         isSame <- readIORef same
         either (const True) not <$> trySynchronous (evaluate (isSame old new))
@@ -83,12 +87,12 @@ polling every act = Signal $ do
   pure
     Source
       { workers =
-          [ Worker "polling" $ do
+          [ Reader "polling" $ do
               writeTVar underWay Nothing
               pure $ \asked -> do
                 t <- now
                 slot <- maybe t (max t . (+ every)) <$> readIORef begun
-                readFrom t slot Untold asked
+                readFrom True t slot Untold asked
           ]
       , view = do
           n <- (+ 1) <$> readTVar views

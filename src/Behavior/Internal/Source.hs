@@ -18,7 +18,12 @@ module Behavior.Internal.Source
 
     -- * What must run for them
   , Worker (..)
+  , ceaseless
   , startWorkers
+  , Sensors
+  , startSensors
+  , goOn
+  , sensorBranches
   , lost
   ) where
 
@@ -85,7 +90,7 @@ instance Applicative Source where
   pure = viewing . pure . pure
   f <*> a =
     (viewing ((<*>) <$> view f <*> view a))
-      { workers = workers f ++ workers a
+      { workers = map (uncurry Worker . ceaseless) (workers f ++ workers a)
       , reading = (\s t -> earliest <$> s <*> t) <$> reading f <*> reading a
       }
    where
@@ -115,13 +120,21 @@ data Moment
   | -- | Later: a value that is not there has been lost.
     Later
 
--- | A thread that a source needs while it is looked at.
-data Worker = Worker
-  { workerName :: String
-  , work :: STM (IO Bool -> IO ())
-  -- ^ What to run, until it is asked to stop (it can see whether it was). A worker
-  -- may be started again after a pause; the transaction prepares each start.
-  }
+-- | A thread that a source needs while it is looked at. It runs until it is asked to stop,
+-- and can see whether it was. It may be started again after a pause; the transaction
+-- prepares each start.
+data Worker
+  = -- | Its name, and what it does.
+    Worker String (STM (IO Bool -> IO ()))
+  | -- | One that makes a first reading, upon which the source has a value, and returns how
+    -- to go on from there.
+    Reader String (STM (IO Bool -> IO (IO Bool -> IO ())))
+
+-- | The worker's name, and all that it does.
+ceaseless :: Worker -> (String, STM (IO Bool -> IO ()))
+ceaseless = \case
+  Worker name run -> (name, run)
+  Reader name once -> (name, (\run asked -> run asked >>= ($ asked)) <$> once)
 
 -- | The value that a transaction gives: event-driven. It reacts to the very
 -- transaction that changes the value, and costs nothing while nothing changes.
@@ -192,16 +205,49 @@ withShared signal body = do
 -- view comes first, and so do those of the workers: else they might just miss the
 -- first reading, and wait for a second one.
 startWorkers :: Scope -> String -> Source a -> IO (View a, [Branch ()])
-startWorkers scope operator source = case workers source of
+startWorkers scope operator source = case map ceaseless (workers source) of
   [] -> (\seen -> (seen, [])) <$> atomically (view source)
   needed -> do
-    (works, seen) <- atomically ((,) <$> traverse work needed <*> view source)
-    running <- for (zip needed works) $ \(w, run) ->
-      worker scope (Label operator (workerName w)) run
+    (works, seen) <- atomically ((,) <$> traverse sequenceA needed <*> view source)
+    running <- for works $ \(name, run) -> worker scope (Label operator name) run
     (seen, running) <$ giveWay
 
+-- | What reads for an operator.
+data Sensors
+  = Reading [Branch ()]
+  | -- | A thread that ends with its first reading. Who needs no other saves the stop of a
+    -- thread that sleeps, which is dearer than its start.
+    ReadingOnce Label (Branch (IO Bool -> IO ()))
+
+-- | 'startWorkers', but a single sensor makes one reading, until it has to 'goOn'.
+startSensors :: Scope -> String -> Source a -> IO (View a, Sensors)
+startSensors scope operator source = case workers source of
+  [Reader name once] -> do
+    (run, seen) <- atomically ((,) <$> once <*> view source)
+    let label = Label operator name
+    reader <- worker scope label run
+    (seen, ReadingOnce label reader) <$ giveWay
+  _ -> fmap Reading <$> startWorkers scope operator source
+
+-- | Has them read until they are stopped. Call it when a first reading has been told.
+goOn :: Scope -> Sensors -> IO Sensors
+goOn scope = \case
+  ReadingOnce label reader ->
+    ended reader >>= \case
+      Completed run -> do
+        running <- successor scope reader label run
+        pure (Reading [running])
+      _ -> pure (ReadingOnce label reader)
+  running -> pure running
+
+-- | The threads that read.
+sensorBranches :: Sensors -> [SomeBranch]
+sensorBranches = \case
+  Reading running -> map SomeBranch running
+  ReadingOnce _ reader -> [SomeBranch reader]
+
 -- | What a worker has died of, if it has. (One that was asked to stop has not.)
-lost :: Branch () -> STM (Maybe SomeException)
+lost :: Branch a -> STM (Maybe SomeException)
 lost sensor = (>>= cause) <$> outcomeSoFar sensor
  where
   cause = \case
