@@ -158,19 +158,18 @@ worker scope label act = launch scope (start label . act)
 -- | Starts a worker that goes on for a branch that has ended, in its place: what is
 -- left and right of it stays so.
 successor :: Scope -> Branch b -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-successor scope old label act = launchAs (\new -> instead old [new]) scope (start label . act)
+successor scope@(Scope branches) old label act = mask_ $ do
+  new <- worker scope label act
+  modifyIORef' branches (instead old [SomeBranch new] . drop 1)
+  pure new
 
 launch :: Scope -> (IO Bool -> IO (Thread a)) -> IO (Branch a)
-launch = launchAs (:)
-
-launchAs :: (SomeBranch -> [SomeBranch] -> [SomeBranch]) -> Scope -> (IO Bool -> IO (Thread a)) -> IO (Branch a)
-launchAs into (Scope branches) starting = mask_ $ do
+launch (Scope branches) starting = mask_ $ do
   asked <- newIORef False
   thread <- starting (readIORef asked)
   let new = Branch {branchThread = thread, branchAsked = asked}
-  modifyIORef' branches (into (SomeBranch new))
+  modifyIORef' branches (SomeBranch new :)
   pure new
-{-# INLINE launchAs #-}
 
 -- | Takes a branch that has ended, and did not fault, out of the scope, which
 -- otherwise would grow with every branch that an operator ever started.
