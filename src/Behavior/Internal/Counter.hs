@@ -1,33 +1,34 @@
-{-# LANGUAGE MagicHash #-}
-{-# LANGUAGE UnboxedTuples #-}
-
 -- |
--- A number that many threads change at once, by one machine instruction.
+-- What there is in this process, counted. Many threads change a number at once, and to read
+-- one takes a single instruction.
 module Behavior.Internal.Counter
   ( Counter
-  , newCounter
   , add
   , total
+
+    -- * What is counted
+  , threads
+  , simulations
+  , sinks
   ) where
 
-import GHC.Exts
-import GHC.IO (IO (..))
+import Foreign (Ptr, peek)
 
 -- | A number in a place of its own, which is zero at first.
-data Counter = Counter (MutableByteArray# RealWorld)
-
--- | A new one.
-newCounter :: IO Counter
-newCounter = IO $ \s -> case newByteArray# 8# s of
-  (# s1, array #) -> case writeIntArray# array 0# 0# s1 of
-    s2 -> (# s2, Counter array #)
+newtype Counter = Counter (Ptr Int)
 
 -- | Adds to it, in one step.
-add :: Counter -> Int -> IO ()
-add (Counter array) (I# n) = IO $ \s -> case fetchAddIntArray# array 0# n s of
-  (# s1, _ #) -> (# s1, () #)
+foreign import ccall unsafe "behavior_lang_add" add :: Counter -> Int -> IO ()
 
 -- | The number that it has now.
 total :: Counter -> IO Int
-total (Counter array) = IO $ \s -> case atomicReadIntArray# array 0# s of
-  (# s1, n #) -> (# s1, I# n #)
+total (Counter place) = peek place
+
+-- | The threads started by this library that have not ended.
+foreign import ccall "&behavior_lang_threads" threads :: Counter
+
+-- | The simulations that run.
+foreign import ccall "&behavior_lang_simulations" simulations :: Counter
+
+-- | Where events are reported to.
+foreign import ccall "&behavior_lang_sinks" sinks :: Counter

@@ -111,7 +111,7 @@ startThen then' label act = inSimulation (startReally then' label act) (startSim
 startReally :: (Either SomeException a -> STM ()) -> Label -> IO a -> IO (Thread a)
 startReally then' label act = do
   result <- STM.newTVarIO Nothing
-  add livingCount 1
+  add threads 1
   -- Forked masked: an exception cannot strike before 'try' is in place, nor
   -- between the end of the action and the publication of how it ended.
   thread <- forkIOWithUnmask $ \unmask -> do
@@ -125,7 +125,7 @@ startSimulated then' label act simulation = do
   result <- STM.newTVarIO Nothing
   let report event = tell event >> record simulation event
   thread <- spawn simulation label (life report label act) (\end -> STM.writeTVar result (Just end) >> then' end)
-  add livingCount 1
+  add threads 1
   pure (Thread thread result)
 {-# NOINLINE startSimulated #-}
 
@@ -136,7 +136,7 @@ life report label act begin unmask = do
   report (Started label)
   end <- try (unmask (begin >> act))
   report (Ended label)
-  add livingCount (-1)
+  add threads (-1)
   pure end
 {-# INLINE life #-}
 
@@ -191,11 +191,7 @@ interruptByMessengers errands =
 
 -- | How many threads started by 'start' have not ended.
 living :: IO Int
-living = total livingCount
-
-livingCount :: Counter
-livingCount = unsafePerformIO newCounter
-{-# NOINLINE livingCount #-}
+living = total threads
 
 -- | Runs a transaction, waiting (without using the processor) while it retries.
 --
@@ -311,7 +307,10 @@ refuse operator allowed seconds =
 -- | Reports every event to the given sink while the action runs. The sink is
 -- called by the thread that the event is about, masked; it must not block.
 reportingTo :: (Event -> IO ()) -> IO a -> IO a
-reportingTo sink = bracket_ (writeIORef eventSink (Just sink)) (writeIORef eventSink Nothing)
+reportingTo sink =
+  bracket_
+    (writeIORef eventSink (Just sink) >> add sinks 1)
+    (add sinks (-1) >> writeIORef eventSink Nothing)
 
 -- | Says something that whoever watches should know.
 note :: String -> IO ()
@@ -319,7 +318,10 @@ note text = tell (Noted text) >> inSimulation (pure ()) (\simulation -> record s
 
 -- | Reports an event to the sink, if there is one.
 tell :: Event -> IO ()
-tell event = readIORef eventSink >>= \sink -> for_ sink ($ event)
+tell event = do
+  n <- total sinks
+  when (n > 0) (readIORef eventSink >>= \sink -> for_ sink ($ event))
+{-# INLINE tell #-}
 
 eventSink :: IORef (Maybe (Event -> IO ()))
 eventSink = unsafePerformIO (newIORef Nothing)

@@ -1,22 +1,21 @@
-{-# LANGUAGE LambdaCase #-}
-
 -- |
 -- The switch in the seam: whether an operation is done in reality or in a
 -- simulation.
 --
 -- A simulation takes over the operations of its own threads, and of no others.
--- While none runs, the switch costs one read of a global reference.
+-- While none runs, the switch costs one look at a number.
 module Behavior.Internal.Seam
   ( inSimulation
   , simulator
   , taking
   ) where
 
-import Control.Concurrent (ThreadId, myThreadId)
+import Control.Concurrent (myThreadId)
 import Control.Exception (bracket_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
 import System.IO.Unsafe (unsafePerformIO)
 
+import Behavior.Internal.Counter
 import Behavior.Internal.Simulator
 
 -- | The simulations that run in this process. They do not know of each other.
@@ -31,22 +30,28 @@ inSimulation really simulated = simulator >>= maybe really simulated
 
 -- | The simulation that the calling thread is part of.
 simulator :: IO (Maybe Simulator)
-simulator =
-  readIORef simulators >>= \case
-    [] -> pure Nothing
-    running -> myThreadId >>= whose running
+simulator = do
+  running <- total simulations
+  if running == 0 then pure Nothing else own
 {-# INLINE simulator #-}
 
--- | The simulation in which this thread has the turn. (Not inlined: what is done while no
--- simulation runs is to be short, and to allocate nothing.)
-whose :: [(Int, Simulator)] -> ThreadId -> IO (Maybe Simulator)
-whose [] _ = pure Nothing
-whose ((_, s) : others) self = hasTurn s self >>= \mine -> if mine then pure (Just s) else whose others self
-{-# NOINLINE whose #-}
+-- | The simulation in which the calling thread has the turn. (Not inlined: what is done while
+-- no simulation runs is to be short, and to allocate nothing.)
+own :: IO (Maybe Simulator)
+own = readIORef simulators >>= whose . map snd
+ where
+  whose [] = pure Nothing
+  whose (s : others) = do
+    mine <- hasTurn s =<< myThreadId
+    if mine then pure (Just s) else whose others
+{-# NOINLINE own #-}
 
 -- | Lets a simulation (each has a number of its own) take over its threads'
 -- operations while the action runs.
 taking :: Int -> Simulator -> IO a -> IO a
-taking number s = bracket_ (change ((number, s) :)) (change (filter ((/= number) . fst)))
+taking number s =
+  bracket_
+    (change ((number, s) :) >> add simulations 1)
+    (add simulations (-1) >> change (filter ((/= number) . fst)))
  where
   change f = atomicModifyIORef' simulators (\running -> (f running, ()))
