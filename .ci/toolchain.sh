@@ -154,10 +154,15 @@ run_stack() {
 
 # build KIND:NAME...: what the tools say goes to stderr.
 build() {
+  local targets
   find_toolchain
   case $BEHAVIOR_TOOLCHAIN in
     cabal*) run_cabal build --enable-tests "$@" ;;
-    stack*) run_stack build --test --no-run-tests "${@/#/behavior-lang:}" ;;
+    stack*)
+      targets=("${@/#/behavior-lang:}")
+      # (Stack has one name for the library of a package.)
+      run_stack build --test --no-run-tests "${targets[@]/%:lib:behavior-lang/:lib}"
+      ;;
   esac >&2
 }
 

@@ -208,6 +208,7 @@ fallback first second =
   try first >>= \case
     Right a -> pure a
     Left BehaviorFailed {} -> second
+{-# INLINE fallback #-}
 
 -- | 'fallback' as an operator. It binds tighter than @|||@ and 'Prelude.>>', and
 -- nests to the right.
@@ -221,6 +222,7 @@ fallback first second =
 -- @since 0.1.0.0
 (?) :: Behavior a -> Behavior a -> Behavior a
 (?) = fallback
+{-# INLINE (?) #-}
 
 infixr 3 ?
 
