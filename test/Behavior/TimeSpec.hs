@@ -14,7 +14,8 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), duration, period, reportingTo, sleepUntil)
+import Behavior.Internal.Runtime (Event (..), Label (..), reportingTo, sleepUntil)
+import Behavior.Internal.Seconds (duration, period)
 import Behavior.Time
 import Support
 

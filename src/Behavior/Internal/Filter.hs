@@ -12,6 +12,7 @@ import Control.Exception (ErrorCall (..), SomeException, throwIO)
 import Control.Monad (forever, when)
 
 import Behavior.Internal.Runtime
+import Behavior.Internal.Seconds (duration)
 import Behavior.Internal.Source
 
 -- $setup

@@ -37,8 +37,6 @@ module Behavior.Internal.Runtime
   , sleepUntil
   , sleepBetween
   , sleepToSlot
-  , duration
-  , period
 
     -- * Watching
   , Event (..)
@@ -51,11 +49,9 @@ import Control.Concurrent.STM (STM, TVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
   ( BlockedIndefinitelyOnSTM (..)
-  , ErrorCall (..)
   , Exception (toException)
   , SomeException
   , bracket_
-  , throwIO
   , try
   , uninterruptibleMask_
   )
@@ -73,6 +69,7 @@ import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 import qualified Behavior.Internal.Alarm as Alarm
 import Behavior.Internal.Counter
 import Behavior.Internal.Seam
+import Behavior.Internal.Seconds
 import Behavior.Internal.Simulator
 
 -- | A thread that the library has started, and how it ends.
@@ -287,22 +284,6 @@ sleepBetween (Seconds t) moment@(Seconds time) = inSimulation (Alarm.sleepBetwee
 sleepToSlot :: Seconds -> Seconds -> Seconds -> IO Seconds
 sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time) =
   inSimulation (Seconds <$> Alarm.sleepToSlot every t time) (\simulation -> slot <$ await simulation slot)
-
--- | Refuses what is no duration: a negative number, or NaN.
-duration :: String -> Seconds -> IO Seconds
-duration operator seconds
-  | seconds >= 0 = pure seconds
-  | otherwise = refuse operator "a duration is zero or more seconds" seconds
-
--- | Refuses what is no period: zero, a negative number, or NaN.
-period :: String -> Seconds -> IO Seconds
-period operator seconds
-  | seconds > 0 = pure seconds
-  | otherwise = refuse operator "a period is more than zero seconds" seconds
-
-refuse :: String -> String -> Seconds -> IO a
-refuse operator allowed seconds =
-  throwIO (ErrorCall (operator ++ ": " ++ allowed ++ ", not " ++ show seconds))
 
 -- | Reports every event to the given sink while the action runs. The sink is
 -- called by the thread that the event is about, masked; it must not block.

@@ -14,6 +14,7 @@ import Data.IORef (newIORef, readIORef, writeIORef)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
 import Behavior.Internal.Runtime
+import Behavior.Internal.Seconds (period)
 import Behavior.Internal.Source
 
 -- $setup

@@ -1,11 +1,9 @@
-{-# LANGUAGE GeneralizedNewtypeDeriving #-}
 {-# LANGUAGE RankNTypes #-}
 
 -- |
 -- What the two sides of the seam speak of, and what a simulation does for its threads.
 module Behavior.Internal.Simulator
   ( Label (..)
-  , Seconds (..)
   , Event (..)
   , Simulator (..)
   ) where
@@ -13,7 +11,8 @@ module Behavior.Internal.Simulator
 import Control.Concurrent (ThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception (SomeException)
-import Numeric (showFFloat)
+
+import Behavior.Internal.Seconds (Seconds)
 
 -- | Who started a thread, and what runs in it: @Label "monitor" "task"@.
 data Label = Label
@@ -25,20 +24,6 @@ data Label = Label
 instance Show Label where
   show (Label operator "") = operator
   show (Label operator branch) = operator ++ ": " ++ branch
-
--- | A length of time, or a moment on the clock of 'Behavior.Time.now', in seconds.
--- Write it as a literal: @sleep 0.5@; turn other numbers into it with 'realToFrac'.
---
--- @since 0.1.0.0
-newtype Seconds = Seconds Double
-  deriving (Eq, Ord, Num, Fractional, Real, RealFrac)
-
-instance Show Seconds where
-  -- 0.05, and not 5.0e-2
-  showsPrec precedence (Seconds s) = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
-
-instance Read Seconds where
-  readsPrec precedence input = [(Seconds s, rest) | (s, rest) <- readsPrec precedence input]
 
 -- | What can be reported of the life of a behaviour.
 data Event

@@ -16,7 +16,8 @@ import Behavior.Internal.Failure
   , behaviorFailedToException
   )
 import Behavior.Internal.Reactive (Reaction (..), react)
-import Behavior.Internal.Runtime (Seconds, atomically, duration, now, sleepUntil)
+import Behavior.Internal.Runtime (atomically, now, sleepUntil)
+import Behavior.Internal.Seconds (Seconds, duration)
 import Behavior.Internal.Source (Signal (..), Source (..), View (..), Worker (..), viewing)
 
 -- $setup

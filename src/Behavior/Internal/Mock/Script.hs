@@ -32,7 +32,7 @@ import Control.Exception (ErrorCall (..), Exception (..), SomeException)
 import Data.Foldable (for_)
 
 import Behavior.Internal.Failure (Behavior, Failed (..))
-import Behavior.Internal.Runtime (Seconds, duration)
+import Behavior.Internal.Seconds (Seconds, duration)
 
 -- $setup
 -- >>> import Behavior

@@ -13,8 +13,9 @@ import Control.Exception (SomeException (..), displayException)
 import Data.List (groupBy, intercalate)
 import Numeric (showFFloat)
 
+import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator (Label, Seconds (..))
+import Behavior.Internal.Simulator (Label)
 
 -- $setup
 -- >>> import Behavior

@@ -35,6 +35,7 @@ import Data.IORef
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 
+import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Simulator

@@ -19,10 +19,10 @@ import qualified Data.IntMap.Strict as IntMap
 import Data.List (find)
 import Data.Maybe (isJust)
 
+import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator
 
 -- | Who is next. Nobody when the run has ended by this; then the driver has the turn.
 choose :: Sim -> Maybe Task -> IO (Maybe Task)

@@ -17,7 +17,8 @@ module Behavior.Internal.Sim.Types
 
 import Control.Exception (SomeException)
 
-import Behavior.Internal.Simulator (Label, Seconds)
+import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Simulator (Label)
 
 -- | How to simulate.
 --

@@ -23,9 +23,9 @@ import System.Posix.Signals (raiseSignal, sigKILL)
 import System.Posix.Unistd (usleep)
 #endif
 
+import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator (Seconds (..))
 
 -- | The simulations to look after. The watchdog holds on to them: so GHC does not take
 -- their threads, which only a waiting thread could wake, for deadlocked.

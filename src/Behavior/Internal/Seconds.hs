@@ -1,0 +1,44 @@
+{-# LANGUAGE GeneralizedNewtypeDeriving #-}
+
+-- |
+-- Lengths of time, and moments.
+module Behavior.Internal.Seconds
+  ( Seconds (..)
+
+    -- * What is allowed
+  , duration
+  , period
+  ) where
+
+import Control.Exception (ErrorCall (..), throwIO)
+import Numeric (showFFloat)
+
+-- | A length of time, or a moment on the clock of 'Behavior.Time.now', in seconds.
+-- Write it as a literal: @sleep 0.5@; turn other numbers into it with 'realToFrac'.
+--
+-- @since 0.1.0.0
+newtype Seconds = Seconds Double
+  deriving (Eq, Ord, Num, Fractional, Real, RealFrac)
+
+instance Show Seconds where
+  -- 0.05, and not 5.0e-2
+  showsPrec precedence (Seconds s) = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
+
+instance Read Seconds where
+  readsPrec precedence input = [(Seconds s, rest) | (s, rest) <- readsPrec precedence input]
+
+-- | Refuses what is no duration: a negative number, or NaN.
+duration :: String -> Seconds -> IO Seconds
+duration operator seconds
+  | seconds >= 0 = pure seconds
+  | otherwise = refuse operator "a duration is zero or more seconds" seconds
+
+-- | Refuses what is no period: zero, a negative number, or NaN.
+period :: String -> Seconds -> IO Seconds
+period operator seconds
+  | seconds > 0 = pure seconds
+  | otherwise = refuse operator "a period is more than zero seconds" seconds
+
+refuse :: String -> String -> Seconds -> IO a
+refuse operator allowed seconds =
+  throwIO (ErrorCall (operator ++ ": " ++ allowed ++ ", not " ++ show seconds))
