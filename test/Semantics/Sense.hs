@@ -72,7 +72,7 @@ pollerSteps steps hear t s =
                 (begin t (sensor s))
       Reading r -> [(l, t', read' s r') | (l, t', r') <- steps t r]
       Read result ->
-        silently t s {newest = Just (readings s, result), underWay = Nothing, poll = Sleeping (nextSlot (slot s))}
+        silently t s {newest = Just (readings s, result), underWay = Nothing, poll = next (nextSlot (slot s))}
       Leaving result -> silently t s {poll = Rested (asOutcome result)}
       _ -> []
       ++ [(Happens event, t, s') | asked s == Asked, Just (event, s') <- [hears]]
@@ -89,10 +89,11 @@ pollerSteps steps hear t s =
     Rested _ -> Nothing
     _ -> Just (Silent, heard {poll = Rested (Stopped Nothing)})
   heard = s {asked = Heard}
+  next = if alone s then Pausing else Sleeping
   -- Slots that were missed are skipped.
-  nextSlot next
-    | next >= clock t = next
-    | otherwise = nextSlot (next + period s)
+  nextSlot due
+    | due >= clock t = due
+    | otherwise = nextSlot (due + period s)
 
 -- | A hysteresis remembers also what its operator does not act on.
 reminds :: Now -> Memory -> Source -> Steps Source

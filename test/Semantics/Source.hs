@@ -9,6 +9,8 @@ module Semantics.Source
   , open
   , made
   , startedAt
+  , readingOnce
+  , readingOn
   , viewOf
 
     -- * Looking
@@ -74,6 +76,7 @@ made = \case
         , newest = Nothing
         , underWay = Nothing
         , asked = Heard
+        , alone = False
         , poll = Rested (Stopped Nothing)
         }
   And a b -> Joined AllHold [made a, made b]
@@ -122,6 +125,18 @@ startedAt t = \case
  where
   looksAt inner = Worker {request = Unasked, view = viewOf t inner}
   calmed w = w {overdue = overdue w + overdue w `mod` 2}
+
+-- | For an operator that has not decided yet.
+readingOnce :: Source -> Source
+readingOnce = \case
+  Polling s -> Polling s {alone = True}
+  other -> other
+
+-- | For an operator that waits.
+readingOn :: Source -> Source
+readingOn = \case
+  Polling s@Poller {poll = Pausing next} -> Polling s {alone = False, poll = Sleeping next}
+  other -> other
 
 -- | A view of the values that are read from now on.
 viewOf :: Now -> Source -> View
