@@ -25,8 +25,7 @@ import Control.Exception (evaluate)
 import Control.Monad (forever, replicateM_, when)
 import Data.Foldable (for_)
 import Data.IORef (IORef, newIORef, readIORef, writeIORef)
-import Data.List (sort, transpose)
-import Data.Traversable (for)
+import Data.List (sort)
 import Foreign.C.Types (CInt (..), CUInt (..))
 import System.Environment (getArgs)
 import System.Exit (die)
@@ -48,7 +47,13 @@ data Stage = Stage
   }
 
 main :: IO ()
-main = runInUnboundThread $ getArgs >>= meanwhile >>= measured [("ours", ours), ("bare", bare)]
+main =
+  runInUnboundThread $
+    getArgs >>= \case
+      who : others | Just reacts <- lookup who reactors -> meanwhile others >>= measured who reacts
+      _ -> usage
+ where
+  reactors = [("ours", ours), ("bare", bare)]
 
 -- | Begins what goes on meanwhile, and gives what the figures are called by.
 meanwhile :: [String] -> IO String
@@ -67,7 +72,7 @@ meanwhile = \case
   computations = [("busy", searching), ("counting", counting)]
 
 usage :: IO a
-usage = die "usage: reaction [AGENTS | busy | counting]"
+usage = die "usage: reaction (ours | bare) [AGENTS | busy | counting]"
 
 -- | Interrupts a sleeping task.
 ours :: Stage -> IO ()
@@ -88,26 +93,23 @@ reaction stage = do
   time >>= writeIORef (noted stage)
   STM.atomically (writeTVar (flag stage) False)
 
--- | Changes the condition of each in turn, again and again, whenever all has been quiet for a
--- moment: so that the machine's moods meet all alike.
-measured :: [(String, Stage -> IO ())] -> String -> IO ()
-measured reactors beside = do
-  stages <- for reactors $ \(_, reacts) -> do
-    stage <- Stage <$> newTVarIO False <*> newEmptyMVar <*> newIORef 0
-    _ <- forkIO (reacts stage)
-    stage <$ takeMVar (ready stage)
-  let sample stage = do
+-- | Changes the condition again and again, whenever all has been quiet for a moment.
+measured :: String -> (Stage -> IO ()) -> String -> IO ()
+measured who reacts beside = do
+  stage <- Stage <$> newTVarIO False <*> newEmptyMVar <*> newIORef 0
+  _ <- forkIO (reacts stage)
+  takeMVar (ready stage)
+  let sample = do
         _ <- usleep 300
         changed <- time
         STM.atomically (writeTVar (flag stage) True)
         takeMVar (ready stage)
         reacted <- readIORef (noted stage)
         pure ((reacted - changed) / 1000)
-  _ <- during 0.2 (traverse sample stages)
-  samples <- during 4 (traverse sample stages)
-  for_ (zip reactors (transpose samples)) $ \((who, _), its) ->
-    for_ [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999)] $ \(name, part) ->
-      line (unwords ["reaction", beside, name, who]) (quantile part (sort its))
+  _ <- during 0.2 sample
+  sorted <- sort <$> during 3 sample
+  for_ [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999)] $ \(name, part) ->
+    line (unwords ["reaction", beside, name, who]) (quantile part sorted)
 
 -- | Does it again and again, for so many seconds. In a loop that needs no stack: the runtime
 -- looks through the stack of a thread that waits, before the next one runs.
