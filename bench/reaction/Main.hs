@@ -12,6 +12,7 @@ import Control.Concurrent
   , forkIO
   , forkOn
   , getNumCapabilities
+  , killThread
   , myThreadId
   , newEmptyMVar
   , putMVar
@@ -21,7 +22,7 @@ import Control.Concurrent
   )
 import Control.Concurrent.STM (TVar, check, newTVarIO, readTVar, writeTVar)
 import qualified Control.Concurrent.STM as STM
-import Control.Exception (evaluate)
+import Control.Exception (evaluate, finally)
 import Control.Monad (forever, replicateM_, when)
 import Data.Foldable (for_)
 import Data.IORef (IORef, newIORef, readIORef, writeIORef)
@@ -53,7 +54,7 @@ main =
       who : others | Just reacts <- lookup who reactors -> meanwhile others >>= measured who reacts
       _ -> usage
  where
-  reactors = [("ours", ours), ("bare", bare)]
+  reactors = [("ours", ours), ("by hand", byHand), ("bare", bare)]
 
 -- | Begins what goes on meanwhile, and gives what the figures are called by.
 meanwhile :: [String] -> IO String
@@ -72,13 +73,26 @@ meanwhile = \case
   computations = [("busy", searching), ("counting", counting)]
 
 usage :: IO a
-usage = die "usage: reaction (ours | bare) [AGENTS | busy | counting]"
+usage = die "usage: reaction (ours | \"by hand\" | bare) [AGENTS | busy | counting]"
 
 -- | Interrupts a sleeping task.
 ours :: Stage -> IO ()
 ours stage = Signal.monitor (Signal.watching (readTVar (flag stage))) (reaction stage) task
  where
   task = putMVar (ready stage) () >> sleep 3600
+
+-- | The same steps by hand, and not one more: who hears of the change stops the task, hears
+-- that it has ended, and has another thread recover.
+byHand :: Stage -> IO ()
+byHand stage = forever $ do
+  ended <- newEmptyMVar
+  recovered <- newEmptyMVar
+  task <- forkIO ((putMVar (ready stage) () >> STM.atomically STM.retry) `finally` putMVar ended ())
+  STM.atomically (readTVar (flag stage) >>= check)
+  killThread task
+  takeMVar ended
+  _ <- forkIO (reaction stage >> putMVar recovered ())
+  takeMVar recovered
 
 -- | The least that a reaction can be.
 bare :: Stage -> IO ()

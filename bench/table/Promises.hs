@@ -83,6 +83,7 @@ reactions =
       , [ reaction n share "ours" `atMost` bound
         | (n, share, bound) <- [("N1", "p50", 5), ("N1", "p99", 50), ("N2", "p50", 16), ("N2", "p99", 106)]
         ]
+      , [told (reaction "N1" share "by hand") | share <- ["p50", "p99", "p99.9"]]
       , ["reaction among 100000 p99 ours" `within` 5 `times` "reaction among 0 p99 ours"]
       ]
 
