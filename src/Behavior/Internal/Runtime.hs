@@ -280,10 +280,13 @@ sleepBetween :: Seconds -> Seconds -> IO ()
 sleepBetween (Seconds t) moment@(Seconds time) = inSimulation (Alarm.sleepBetween t time) (`await` moment)
 
 -- | Sleeps until a slot of so many seconds begins, and says when that is (in reality perhaps
--- a little later than asked for: see 'Alarm.sleepToSlot'). The second moment is now.
+-- a little later than asked for: see 'Alarm.sleepToSlot'). The second moment is now; a slot
+-- that has begun by then is not waited for.
 sleepToSlot :: Seconds -> Seconds -> Seconds -> IO Seconds
-sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time) =
-  inSimulation (Seconds <$> Alarm.sleepToSlot every t time) (\simulation -> slot <$ await simulation slot)
+sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time)
+  | time <= t = pure slot
+  | otherwise =
+      inSimulation (Seconds <$> Alarm.sleepToSlot every t time) (\simulation -> slot <$ await simulation slot)
 
 -- | Reports every event to the given sink while the action runs. The sink is
 -- called by the thread that the event is about, masked; it must not block.
