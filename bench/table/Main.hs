@@ -151,12 +151,16 @@ check file ratios = do
   before <- kept file
   putStrLn ("\n-- Beside the ratios in " ++ file)
   for_ (Map.toList (before Map.\\ ratios)) $ \(pair, _) -> putStrLn (both pair ++ ": not measured")
-  let worse = Map.filter slower (Map.intersectionWith (,) ratios before)
-  for_ (Map.toList worse) $ \(pair, (are, were)) ->
-    putStrLn (both pair ++ ": SLOWER, " ++ told' are ++ " where it was " ++ told' were)
-  if null worse then putStrLn "none is slower by more than a third" else exitFailure
+  let worse = Map.filter (uncurry exceed) (Map.intersectionWith (,) ratios before)
+      (slower, moods) = Map.partition (and . uncurry (zipWith exceeds)) worse
+  told' moods "not in its shortest round, or only because theirs is faster"
+  told' slower "SLOWER"
+  if null slower then putStrLn "none is slower by more than a third" else exitFailure
  where
   both (mine, theirs) = mine ++ " / " ++ theirs
-  told' = concatMap significant . take 1 -- that in the table
-  slower (are, were) = and (zipWith exceeds are were)
+  told' found how =
+    for_ (Map.toList found) $ \(pair, (are, were)) ->
+      putStrLn (both pair ++ ": " ++ inTable are ++ " where it was " ++ inTable were ++ ": " ++ how)
+  inTable = concatMap significant . take 1
+  exceed are were = or (take 1 (zipWith exceeds are were))
   ratio `exceeds` was = ratio > was * 4 / 3
