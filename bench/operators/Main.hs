@@ -26,22 +26,24 @@ main :: IO ()
 main =
   runInUnboundThread $
     getArgs >>= \case
-      [] -> measureCosts
+      [] -> measureOperators
+      ["fallback"] -> measureAll trying
       ["idle"] -> mapM_ measureIdle [10, 100, 1000]
-      _ -> die "usage: operators [idle]"
+      _ -> die "usage: operators [fallback | idle]"
 
--- | Nanoseconds.
-measureCosts :: IO ()
-measureCosts = do
+measureOperators :: IO ()
+measureOperators = do
   never <- newEmptyMVar
   quiet <- newTVarIO False
   state <- newIORef 0
   let blocked = takeMVar never
       steps = [looks state n | n <- [1 .. 100000]]
-      cases = trying ++ pairs blocked ++ watched quiet blocked ++ many blocked ++ long steps
-  replicateM_ 3 (mapM_ measure cases)
+  measureAll (pairs blocked ++ watched quiet blocked ++ many blocked ++ long steps)
   -- In reach to the end, or they who wait for it would be told that it never comes.
   putMVar never ()
+
+measureAll :: [Case] -> IO ()
+measureAll = replicateM_ 3 . mapM_ measure
 
 -- | Its name, how often to do it, and how to do it so many times.
 data Case = Case String Int (Int -> Behavior ())
@@ -146,7 +148,7 @@ watch = Signal.watching . readTVar
 set :: TVar Bool -> Bool -> Behavior ()
 set flag = atomically . writeTVar flag
 
--- | After a warm-up.
+-- | Nanoseconds, after a warm-up.
 measure :: Case -> IO ()
 measure (Case name times act) = do
   act (times `div` 10)

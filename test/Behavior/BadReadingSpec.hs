@@ -190,7 +190,7 @@ stale = do
     atomically reading `shouldReturn` Nothing
     structured $ \scope -> do
       (seen, _) <- startWorkers scope "test" source
-      atomically (Source.look seen Source.First)
+      atomically (Source.atFirst seen)
       atomically reading `shouldReturn` Nothing
       pure (pure ())
 

@@ -102,20 +102,20 @@ data Reaction a = Run String (Behavior a) | RunToEnd String (Behavior ()) | Conc
 react :: forall k a. Eq k => Maybe Flaw -> String -> Signal k -> (k -> Reaction a) -> Behavior a
 react flaw operator signal reaction = structured flaw operator $ \scope -> do
   source <- open signal
-  let begin moment = do
+  let begin how = do
         (works, seen) <- atomically ((,) <$> traverse (sequenceA . ceaseless) (workers source) <*> view source)
         sensors <- for works (uncurry (worker scope))
-        choose sensors seen moment
+        choose sensors seen how
 
-      choose :: [Branch ()] -> View k -> Moment -> IO (IO a)
-      choose sensors seen moment = observe (look seen moment) >>= either (pure . throwIO) (obey sensors seen)
+      choose :: [Branch ()] -> View k -> (View k -> STM k) -> IO (IO a)
+      choose sensors seen how = observe (how seen) >>= either (pure . throwIO) (obey sensors seen)
 
       obey sensors seen old = case reaction old of
         Conclude verdict -> pure verdict
         RunToEnd name recovery -> ask (map SomeBranch sensors) >> recover sensors seen name recovery Nothing
         Run name act -> do
           running <- branch scope name act
-          event <- observe ((Right <$> outcomeOf running) `orElse` (Left <$> (look seen Later >>= \new -> check (new /= old) >> pure new)))
+          event <- observe ((Right <$> outcomeOf running) `orElse` (Left <$> (later seen >>= \new -> check (new /= old) >> pure new)))
           case event of
             Right (Right outcome) -> pure (settle outcome)
             Right (Left new) -> turn sensors seen new running (reaction new)
@@ -139,7 +139,7 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         (Conclude verdict, Done (Right _)) | flaw == Just DropsWhatCompletedInTime -> pure verdict
         (_, Done (Right a)) -> pure (pure a)
         (RunToEnd name recovery, Stopped _)
-          | flaw == Just ReadsAgainBeforeTheRecovery -> rested sensors >> begin Later
+          | flaw == Just ReadsAgainBeforeTheRecovery -> rested sensors >> begin later
           | otherwise -> recover sensors seen name recovery Nothing
         (RunToEnd name recovery, wrong)
           | flaw /= Just ThrowsBeforeTheRecovery -> recover sensors seen name recovery (Just (settle wrong))
@@ -150,25 +150,25 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         again = case what of
           Run _ _
             | flaw == Just DoesNotReadAgain -> obey sensors seen new
-            | otherwise -> atomically (view source) >>= \fresh -> choose sensors fresh Later
-          _ -> rested sensors >> begin Later
+            | otherwise -> atomically (view source) >>= \fresh -> choose sensors fresh later
+          _ -> rested sensors >> begin later
 
       recover sensors seen name recovery aftermath = do
         recovered <- branch scope name recovery
         outcome <-
           if flaw == Just WatchesDuringTheRecovery
-            then observe ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ (look seen Later >>= \now' -> check (unwanted now'))))
+            then observe ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ (later seen >>= \now' -> check (unwanted now'))))
             else Right . Just <$> atomically (outcomeOf recovered)
         case (outcome, aftermath) of
-          (Right (Just (Done (Right ()))), Nothing) -> rested sensors >> begin Later
+          (Right (Just (Done (Right ()))), Nothing) -> rested sensors >> begin later
           (Right (Just wrong), Nothing) -> pure (settle wrong >> throwIO (ErrorCall "unreachable"))
           (_, Just verdict) -> pure verdict
-          (_, Nothing) -> stop [] recovered >> rested sensors >> begin Later
+          (_, Nothing) -> stop [] recovered >> rested sensors >> begin later
 
       unwanted value = case reaction value of
         RunToEnd _ _ -> False
         _ -> True
-  begin First
+  begin atFirst
  where
   observe act = trySynchronous (atomically act)
   rested = traverse_ (atomically . outcomeOf)
@@ -186,7 +186,7 @@ timeoutWith flaw seconds act
   | otherwise = do
       over <- newTVarIO False
       let clock = sleep seconds >> atomically (writeTVar over True)
-          elapsed = Signal (pure (viewing (pure (View (\_ -> readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
+          elapsed = Signal (pure (viewing (pure (always (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
       react flaw "timeout" elapsed (\up -> if up then Conclude (throwIO (TimedOut seconds)) else Run "branch" act)
 
 -- * Sensors
@@ -213,7 +213,7 @@ pollingWith flaw every act = Signal $ do
         pure (\asked -> readings asked `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
       seen = do
         before <- readTVar started
-        pure . View $ \_ ->
+        pure . always $
           readTVar newest >>= \case
             Just (k, read') | k > before -> either throwSTM pure read'
             _ -> retry

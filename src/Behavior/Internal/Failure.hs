@@ -33,6 +33,7 @@ module Behavior.Internal.Failure
   , isFailure
   , isCancellation
   , trySynchronous
+  , catchSynchronous
 
     -- * What to do when something fails
   , fallback
@@ -181,7 +182,11 @@ isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 
 -- | 'try' that lets cancellations through.
 trySynchronous :: IO a -> IO (Either SomeException a)
-trySynchronous act = (Right <$> act) `catch` \e -> if isCancellation e then throwIO e else pure (Left e)
+trySynchronous act = (Right <$> act) `catchSynchronous` (pure . Left)
+
+-- | Handles whatever the action throws, but not a cancellation.
+catchSynchronous :: IO a -> (SomeException -> IO a) -> IO a
+catchSynchronous act handler = act `catch` \e -> if isCancellation e then throwIO e else handler e
 
 -- | @fallback first second@ runs @first@; if that /fails/, it runs @second@.
 --

@@ -104,4 +104,4 @@ hysteresis low high signal = Signal $ do
 -- | A look for those who wait for values only: what it throws is for the operator,
 -- which looks for itself.
 quietly :: View a -> STM a
-quietly v = look v First `catchSTM` \(_ :: SomeException) -> retry
+quietly v = atFirst v `catchSTM` \(_ :: SomeException) -> retry

@@ -22,10 +22,9 @@ module Behavior.Internal.Reactive
 
 import Control.Concurrent.STM (STM, check)
 import Control.Exception (SomeException, throwIO)
-import Control.Monad (join)
 import Data.List (findIndex)
 
-import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
+import Behavior.Internal.Failure (Behavior, catchSynchronous, failWith)
 import Behavior.Internal.Runtime (Label (..), atomically, unlessAtAGlance)
 import Behavior.Internal.Scope
 import Behavior.Internal.Source
@@ -59,21 +58,20 @@ data Engine k a = Engine
 react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react name signal reacting = structured $ \within -> do
   opened <- open (distinct signal)
-  begin Engine {operator = name, scope = within, source = opened, reaction = reacting} First
+  begin Engine {operator = name, scope = within, source = opened, reaction = reacting} atFirst
 
--- | Starts the sensors.
-begin :: Eq k => Engine k a -> Moment -> IO (IO a)
-begin engine moment = do
+-- | Starts the sensors, and looks in the given way.
+begin :: Eq k => Engine k a -> (View k -> STM k) -> IO (IO a)
+begin engine how = do
   (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
-  choose engine sensors seen moment
+  choose engine sensors seen how
 
 -- | Nothing runs: reads, and does what the value says now.
-choose :: Eq k => Engine k a -> Sensors -> View k -> Moment -> IO (IO a)
-choose engine sensors seen moment =
-  observe (attend sensors (look seen moment)) >>= obey engine sensors (look seen Later)
+choose :: Eq k => Engine k a -> Sensors -> View k -> (View k -> STM k) -> IO (IO a)
+choose engine sensors seen how = atomically (attend sensors (how seen)) >>= obey engine sensors seen
 
-obey :: Eq k => Engine k a -> Sensors -> STM k -> Either SomeException k -> IO (IO a)
-obey engine sensors value = \case
+obey :: Eq k => Engine k a -> Sensors -> View k -> Either SomeException k -> IO (IO a)
+obey engine sensors seen = \case
   Left dead -> pure (throwIO dead)
   Right old -> case reaction engine old of
     Conclude verdict -> pure verdict
@@ -82,7 +80,7 @@ obey engine sensors value = \case
       recover engine sensors name recovery Nothing
     Idle -> do
       awake <- goOn (scope engine) sensors
-      observe (attend awake (changed old)) >>= obey engine awake value
+      observe (attend awake (changed old)) >>= obey engine awake seen
     Run name act -> do
       running <- branch (scope engine) (Label (operator engine) name) act
       -- The branch is looked at first: one that has ended by itself is not
@@ -99,7 +97,7 @@ obey engine sensors value = \case
           Left dead -> interrupt engine awake running (Conclude (throwIO dead))
  where
   changed old = do
-    new <- value
+    new <- later seen
     check (new /= old)
     pure new
 
@@ -123,7 +121,7 @@ interrupt engine sensors running = \case
       Stopped _ -> do
         forget (scope engine) running
         seen <- atomically (view (source engine))
-        choose engine sensors seen Later
+        choose engine sensors seen later
       end -> pure (settle end)
  where
   stopping others = ask (others ++ [SomeBranch running]) >> ended running
@@ -140,17 +138,17 @@ recover engine sensors name recovery aftermath = do
     (Right (), Nothing) -> do
       forget (scope engine) recovered
       rested <- traverse (rest (scope engine)) (sensorBranches sensors)
-      if and rested then begin engine Later else pure (failWith "a sensor faulted")
+      if and rested then begin engine later else pure (failWith "a sensor faulted")
 
 -- | Looks at a value, and first at the sensors that it comes from.
 attend :: Sensors -> STM a -> STM (Either SomeException a)
-attend sensors value = foldr orLost (Right <$> value) (sensorBranches sensors)
- where
-  orLost (SomeBranch sensor) others = lost sensor >>= maybe others (pure . Left)
+attend sensors value = lost sensors >>= maybe (Right <$> value) (pure . Left)
 
--- | Waits for a transaction; what it throws is a sensor's.
+-- | Waits for a transaction; what it throws is a sensor's. (Not inlined: who waits is to keep
+-- the transaction alone, and not a second time in a handler's closure.)
 observe :: STM (Either SomeException a) -> IO (Either SomeException a)
-observe = fmap join . trySynchronous . atomically
+observe transaction = atomically transaction `catchSynchronous` (pure . Left)
+{-# NOINLINE observe #-}
 
 -- | Waits until a branch that was asked to stop has ended. If it faulted it stays
 -- in the scope, which throws its fault.

@@ -112,7 +112,7 @@ startReally then' label act = do
   -- Forked masked: an exception cannot strike before 'try' is in place, nor
   -- between the end of the action and the publication of how it ended.
   thread <- forkIOWithUnmask $ \unmask -> do
-    end <- life tell label act (pure ()) unmask
+    end <- life tell label (unmask act)
     STM.atomically (STM.writeTVar result (Just end) >> then' end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
@@ -121,17 +121,18 @@ startSimulated :: (Either SomeException a -> STM ()) -> Label -> IO a -> Simulat
 startSimulated then' label act simulation = do
   result <- STM.newTVarIO Nothing
   let report event = tell event >> record simulation event
-  thread <- spawn simulation label (life report label act) (\end -> STM.writeTVar result (Just end) >> then' end)
+  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> act))) $ \end ->
+    STM.writeTVar result (Just end) >> then' end
   add threads 1
   pure (Thread thread result)
 {-# NOINLINE startSimulated #-}
 
--- | What a thread does (it reports, and begins, as it is told), and how the action ended.
-life :: (Event -> IO ()) -> Label -> IO a -> IO () -> (forall b. IO b -> IO b) -> IO (Either SomeException a)
-life report label act begin unmask = do
+-- | What a thread does (it reports as it is told), and how the action ended.
+life :: (Event -> IO ()) -> Label -> IO a -> IO (Either SomeException a)
+life report label act = do
   when labelling (bear label)
   report (Started label)
-  end <- try (unmask (begin >> act))
+  end <- try act
   report (Ended label)
   add threads (-1)
   pure end

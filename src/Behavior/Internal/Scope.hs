@@ -111,7 +111,8 @@ data Outcome a
 structured :: (Scope -> IO (IO a)) -> IO a
 structured body = mask $ \restore -> do
   scope <- Scope <$> newIORef []
-  verdict <- try (restore (body scope))
+  -- (As @body scope@ it would be a thunk first, in every operator.)
+  verdict <- try (restore (pure scope >>= body))
   faults <- end scope
   -- A cancellation that came while the branches were stopping arrives here, and
   -- not when the outcome has been thrown into some handler of the caller's.

@@ -98,7 +98,7 @@ polling every act = Signal $ do
       , view = do
           n <- (+ 1) <$> readTVar views
           writeTVar views n
-          pure . View $ \_ ->
+          pure . always $
             readTVar newest >>= \case
               Just (asking, read') | asking >= n -> either throwSTM pure read'
               _ -> retry

@@ -13,8 +13,8 @@ module Behavior.Internal.Source
   , Source (..)
   , viewing
   , View (..)
+  , always
   , looking
-  , Moment (..)
 
     -- * What must run for them
   , Worker (..)
@@ -30,7 +30,6 @@ module Behavior.Internal.Source
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally)
 import Control.Monad (when)
-import Data.Foldable (for_, traverse_)
 import Data.Function (on)
 import Data.Traversable (for)
 
@@ -98,27 +97,29 @@ instance Applicative Source where
     earliest s Nothing = s
     earliest Nothing t = t
 
--- | How to look at a value. The look retries while there is none yet, and throws
--- when there is none any more.
-newtype View a = View {look :: Moment -> STM a}
+-- | How to look at a value. Who looks throws when there is none any more.
+data View a = View
+  { atFirst :: !(STM a)
+  -- ^ For the first time: waits for a value, however long that takes to come.
+  , later :: !(STM a)
+  -- ^ After that: a value that is not there has been lost.
+  }
 
 instance Functor View where
   fmap f = looking (fmap f)
 
 instance Applicative View where
-  pure a = View (\_ -> pure a)
-  f <*> a = View (\moment -> look f moment <*> look a moment)
+  pure = always . pure
+  View f f' <*> View a a' = View (f <*> a) (f' <*> a')
+
+-- | To look the same way each time.
+always :: STM a -> View a
+always value = View value value
 
 -- | The view, looked at in another way.
 looking :: (STM a -> STM b) -> View a -> View b
-looking f v = View (f . look v)
-
--- | When an operator looks.
-data Moment
-  = -- | For the first time: it waits for a value, however long that takes to come.
-    First
-  | -- | Later: a value that is not there has been lost.
-    Later
+looking f (View a a') = View (f a) (f a')
+{-# INLINE looking #-}
 
 -- | A thread that a source needs while it is looked at. It runs until it is asked to stop,
 -- and can see whether it was. It may be started again after a pause; the transaction
@@ -149,10 +150,9 @@ ceaseless = \case
 --
 -- @since 0.1.0.0
 watching :: STM a -> Signal a
-watching transaction = Signal . pure . viewing . pure $ View value
+watching transaction = Signal . pure . viewing . pure $ View transaction (transaction `orElse` noneAnyMore)
  where
-  value First = transaction
-  value Later = transaction `orElse` failWith "the signal has no value any more"
+  noneAnyMore = failWith "the signal has no value any more"
 
 -- | The signal, for who does not mind if he is not told the same value twice.
 distinct :: Eq a => Signal a -> Signal a
@@ -190,10 +190,9 @@ withShared signal body = do
     let shared = Signal $ do
           atomically stillOpen
           running <- atomically (readTMVar others)
-          let attended value = stillOpen >> for_ running unlessLost >> value
+          let attended value = stillOpen >> anyLost running >>= maybe value throwSTM
           pure (viewing (looking attended <$> view source)) {reading = pure underWay}
         stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
-        unlessLost sensor = lost sensor >>= traverse_ throwSTM
     -- The body comes first, so that its fault is the leftmost.
     main <- branch scope (Label "withShared" "body") (body shared)
     (_, running) <- startWorkers scope "withShared" source
@@ -222,6 +221,7 @@ data Sensors
 -- | 'startWorkers', but a single sensor makes one reading, until it has to 'goOn'.
 startSensors :: Scope -> String -> Source a -> IO (View a, Sensors)
 startSensors scope operator source = case workers source of
+  [] -> (\seen -> (seen, Reading [])) <$> atomically (view source)
   [Reader name once] -> do
     (run, seen) <- atomically ((,) <$> once <*> view source)
     let label = Label operator name
@@ -246,10 +246,17 @@ sensorBranches = \case
   Reading running -> map SomeBranch running
   ReadingOnce _ reader -> [SomeBranch reader]
 
--- | What a worker has died of, if it has. (One that was asked to stop has not.)
-lost :: Branch a -> STM (Maybe SomeException)
-lost sensor = (>>= cause) <$> outcomeSoFar sensor
+-- | What one of them has died of, if it has, the leftmost first. (One that was asked to stop
+-- has not.)
+lost :: Sensors -> STM (Maybe SomeException)
+lost = \case
+  Reading running -> anyLost running
+  ReadingOnce _ reader -> anyLost [reader]
+
+anyLost :: [Branch a] -> STM (Maybe SomeException)
+anyLost = foldr orLost (pure Nothing)
  where
+  orLost sensor others = outcomeSoFar sensor >>= maybe others (pure . Just) . (>>= cause)
   cause = \case
     Failing e -> Just e
     Faulted e -> Just e

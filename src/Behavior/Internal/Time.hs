@@ -18,7 +18,7 @@ import Behavior.Internal.Failure
 import Behavior.Internal.Reactive (Reaction (..), react)
 import Behavior.Internal.Runtime (atomically, now, sleepUntil)
 import Behavior.Internal.Seconds (Seconds, duration)
-import Behavior.Internal.Source (Signal (..), Source (..), View (..), Worker (..), viewing)
+import Behavior.Internal.Source (Signal (..), Source (..), always, Worker (..), viewing)
 
 -- $setup
 -- >>> import Behavior (sleep, (?))
@@ -69,4 +69,4 @@ elapsed seconds = Signal $ do
   over <- newTVarIO (seconds <= 0)
   deadline <- (+ seconds) <$> now
   let clock = sleepUntil deadline >> atomically (writeTVar over True)
-  pure (viewing (pure (View (\_ -> readTVar over)))) {workers = [Worker "clock" (pure (const clock))]}
+  pure (viewing (pure (always (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]}

@@ -1,5 +1,3 @@
-{-# LANGUAGE LambdaCase #-}
-
 -- |
 -- Scripted conditions. No thread of its own changes one: whoever looks at it first
 -- makes the changes that are due, and who watches it wakes for each. So no thread
@@ -23,7 +21,7 @@ import Data.Maybe (isJust, listToMaybe)
 import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Runtime
-import Behavior.Internal.Source (Moment (..), Signal (..), Source (workers), View (..), Worker (..), viewing)
+import Behavior.Internal.Source (Signal (..), Source (workers), View (..), Worker (..), viewing)
 import Behavior.Internal.Mock.World
 
 -- $setup
@@ -147,14 +145,10 @@ signal c = Signal $ do
           changes <- readTVar (ahead c)
           pure (listToMaybe [zero + s | (s, _) <- changes], [])
         for_ next $ \s -> sleepUntil s >> wake
-      value when' =
-        (readTVar made >>= check) >> readTVar (current c) >>= \case
-          Just a -> pure a
-          Nothing -> case when' of
-            First -> retry
-            Later -> failWith (nameOf c ++ " has no value any more")
+      valueOr none = (readTVar made >>= check) >> readTVar (current c) >>= maybe none pure
+      noneAnyMore = failWith (nameOf c ++ " has no value any more")
   pure
-    (viewing (pure (View value)))
+    (viewing (pure (View (valueOr retry) (valueOr noneAnyMore))))
       { workers = [Worker "clock" (const wake <$ writeTVar made False) | changesByItself]
       }
 
