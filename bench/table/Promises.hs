@@ -130,7 +130,7 @@ fleetTime =
     ]
 
 fleet :: String -> [Row] -> Group
-fleet title = Group title "-N1 -I0 -A1g -ki768 -kc4k"
+fleet title = Group title "-N1 -I0 -A1g -ki672 -kc4k"
 
 -- What it costs that the operators can be simulated: with the switch and without.
 
