@@ -4,7 +4,10 @@
 -- the same run.
 --
 -- The runtime must keep statistics: run it with @+RTS -T@.
-module Memory (inConstantMemory) where
+module Memory
+  ( inConstantMemory
+  , growingByLessThan
+  ) where
 
 import Control.Monad (when)
 import Data.IORef
@@ -14,9 +17,14 @@ import System.Mem (performMajorGC)
 import Test.Hspec
 
 -- | Gives the action what it is to call at each of so many steps, and compares
--- what is live at a tenth of them with what is live at the last.
+-- what is live at a tenth of them with what is live at the last: that is less than a
+-- megabyte more.
 inConstantMemory :: Int -> (IO () -> IO ()) -> Expectation
-inConstantMemory steps act = do
+inConstantMemory = growingByLessThan 1000000
+
+-- | The same, for so many bytes.
+growingByLessThan :: Int64 -> Int -> (IO () -> IO ()) -> Expectation
+growingByLessThan bytes steps act = do
   getRTSStatsEnabled `shouldReturn` True
   counter <- newIORef (0 :: Int)
   early <- newIORef Nothing
@@ -27,7 +35,7 @@ inConstantMemory steps act = do
     when (n == steps) $ liveBytes >>= writeIORef late . Just
   measured <- (,) <$> readIORef early <*> readIORef late
   case measured of
-    (Just atFirst, Just atLast) -> atLast - atFirst `shouldSatisfy` (< 1000000)
+    (Just atFirst, Just atLast) -> atLast - atFirst `shouldSatisfy` (< bytes)
     _ -> expectationFailure "there were fewer steps than it should have made"
 
 liveBytes :: IO Int64

@@ -17,6 +17,7 @@ import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
 import Test.QuickCheck hiding (within)
 
 import Behavior.Internal.Alarm
+import Memory
 import Support
 
 spec :: Spec
@@ -149,6 +150,16 @@ many = do
         launching (sleepBetween t (t + 0.002 - k / 8000)) $ \_ ->
           replicateM_ (n `mod` 7) yield
       when (n `mod` 10 == 0) $ sleepBetween t (t + 0.003)
+
+  -- (Always somebody sleeps, so that one clock goes off again and again.)
+  it "wake by a clock that needs no more memory the longer it goes" $
+    growingByLessThan 20000 400 $ \step -> do
+      t <- getMonotonicTime
+      forConcurrently_ [1 .. 40] $ \k -> do
+        sleepBetween t (t + k / 1000) >> step
+        replicateM_ 9 $ do
+          t' <- getMonotonicTime
+          sleepBetween t' (t' + 0.04) >> step
 
   -- (Who is interrupted leaves something behind until the gate opens.)
   prop "nobody waits at a gate that is farther away than he has slept, or than a second" $

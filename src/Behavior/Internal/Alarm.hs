@@ -22,7 +22,7 @@ import Control.Concurrent (forkIO, myThreadId, rtsSupportsBoundThreads, threadDe
 import Control.Concurrent.MVar
 import Control.Exception (mask_)
 import Control.Monad (void, when)
-import Data.Foldable (for_, toList, traverse_)
+import Data.Foldable (toList, traverse_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
@@ -131,7 +131,8 @@ clock t later = do
   -- First those who were woken: if they have gone to sleep again when this thread does,
   -- the system has no thread to wake for them.
   yield
-  for_ next $ \t' -> clock t' (max t' (current + pause))
+  -- (Not by 'Data.Foldable.for_', which would come back: the clock's stack would grow.)
+  maybe (pure ()) (\t' -> clock t' (max t' (current + pause))) next
  where
   delay now = when (left > 0) $ sleepFor left >> getMonotonicTime >>= delay
    where

@@ -144,7 +144,7 @@ signal c = Signal $ do
           writeTVar made True
           changes <- readTVar (ahead c)
           pure (listToMaybe [zero + s | (s, _) <- changes], [])
-        for_ next $ \s -> sleepUntil s >> wake
+        maybe (pure ()) (\s -> sleepUntil s >> wake) next
       valueOr none = (readTVar made >>= check) >> readTVar (current c) >>= maybe none pure
       noneAnyMore = failWith (nameOf c ++ " has no value any more")
   pure
