@@ -16,10 +16,11 @@ import Test.QuickCheck hiding (Failure, within)
 import Behavior
 import Behavior.Internal.Runtime (Event (..), Label (..), reportingTo, sleepUntil)
 import Behavior.Internal.Seconds (duration, period)
+import Behavior.Sim (Outcome (..), Run (outcome), explain, simulate)
 import Behavior.Time
 import Support
 
--- | Real time passes in here, but never more of it than a few milliseconds, and no
+-- | Where real time passes in here it is never more than a few milliseconds, and no
 -- example depends on how fast the machine is.
 spec :: Spec
 spec = guarded $ do
@@ -30,6 +31,15 @@ spec = guarded $ do
       moments `shouldBe` sort moments
   describe "sleep" sleeping
   describe "timeout" timeouts
+
+-- | In a simulation: there no time passes before a behaviour has begun.
+virtually :: Behavior a -> IO a
+virtually act =
+  simulate act >>= \run -> case outcome run of
+    Returned a -> pure a
+    Failing e -> throwIO e
+    Faulting e -> throwIO e
+    other -> fail (explain other)
 
 infinite, notANumber :: Seconds
 infinite = 1 / 0
@@ -104,39 +114,27 @@ timeouts = do
       `shouldReturn` (FailedWith (show (TimedOut 0)), "")
 
   it "returns when the behaviour has ended, however slow its cleanup" $ do
-    notebook <- newNotebook
-    cleaning <- newGate
-    mayEnd <- newGate
-    let act = uninterruptibly hang (open cleaning >> pass mayEnd >> note notebook "cleaned up")
-    launching (leavingNothing (timeout 0.001 act)) $ \caller -> do
-      pass cleaning
-      stillRunning caller
-      open mayEnd
-      awaitEnd caller `shouldReturn` (FailedWith (show (TimedOut 0.001)) :: Ending ())
-      notes notebook `shouldReturn` ["cleaned up"]
+    (end, said) <- observing $ \notebook ->
+      virtually $ do
+        ended <- try (timeout 1 (uninterruptibly (sleep 3600) (sleep 5 >> note notebook "cleaned up")))
+        (,) (ended :: Either TimedOut ()) <$> now
+    (end, said) `shouldBe` (Gave (Left (TimedOut 1), 6), ["cleaned up"])
 
   it "keeps a result that the behaviour returns although it was asked to stop" $
-    timeout 0.001 (hang `catch` \(_ :: SomeAsyncException) -> pure 'a') `shouldReturn` 'a'
+    virtually (timeout 1 ((sleep 3600 >> pure 'b') `catch` \(_ :: SomeAsyncException) -> pure 'a')) `shouldReturn` 'a'
 
   it "throws a failure or a fault of the cleanup instead of its own failure" $ do
-    timeout 0.001 (hang `onException` failWith "cleanup" :: IO ())
+    virtually (timeout 1 (sleep 3600 `onException` failWith "cleanup" :: IO ()))
       `shouldThrow` (== FailedBecause "cleanup")
-    timeout 0.001 (hang `onException` throwIO (Fault "cleanup") :: IO ())
+    virtually (timeout 1 (sleep 3600 `onException` throwIO (Fault "cleanup") :: IO ()))
       `shouldThrow` (== Fault "cleanup")
 
-  it "does not ask again, when it is cancelled, a behaviour that it asked when time was up" $ do
-    notebook <- newNotebook
-    cleaning <- newGate
-    mayEnd <- newGate
-    let act = hang `onException` (open cleaning >> pass mayEnd >> note notebook "cleaned up")
-    launching (timeout 0.001 act) $ \caller -> do
-      pass cleaning
-      awaitIdle (asyncThreadId caller)
-      throwTo (asyncThreadId caller) (Cancel "the caller")
-      stillRunning caller
-      open mayEnd
-      awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
-      notes notebook `shouldReturn` ["cleaned up"]
+  it "does not ask again, when it is cancelled, a behaviour that it asked when time was up" $
+    observing
+      ( \notebook ->
+          virtually (timeout 3 (timeout 1 (sleep 3600 `onException` (sleep 5 >> note notebook "cleaned up"))))
+      )
+      `shouldReturn` (FailedWith (show (TimedOut 3)) :: Ending (), ["cleaned up"])
 
   it "is told apart from the timeouts around and within it" $ do
     timeout 3600 (timeout 0.001 hang) `shouldThrow` (== TimedOut 0.001)
