@@ -49,11 +49,9 @@ measureAll cases = replicateM_ 2 (mapM_ measure (cases ++ reverse cases))
 -- | Its name, how often to do it, and how to do it so many times.
 data Case = Case String Int (Int -> Behavior ())
 
--- | What is done anew each time. (Not inlined, so that all are done by the same loop: where a
--- loop happens to lie makes a difference of a fifth to what takes five nanoseconds.)
+-- | What is done anew each time.
 each :: String -> Int -> Behavior a -> Case
 each name times act = Case name times (\n -> replicateM_ n (void act))
-{-# NOINLINE each #-}
 
 trying :: [Case]
 trying =

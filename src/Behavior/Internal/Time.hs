@@ -18,7 +18,7 @@ import Behavior.Internal.Failure
 import Behavior.Internal.Reactive (Reaction (..), react)
 import Behavior.Internal.Runtime (atomically, now, sleepUntil)
 import Behavior.Internal.Seconds (Seconds, duration)
-import Behavior.Internal.Source (Signal (..), Source (..), always, Worker (..), viewing)
+import Behavior.Internal.Source (Signal (..), Source (..), Worker (..), always, viewing)
 
 -- $setup
 -- >>> import Behavior (sleep, (?))

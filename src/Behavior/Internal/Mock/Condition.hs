@@ -144,7 +144,7 @@ signal c = Signal $ do
           writeTVar made True
           changes <- readTVar (ahead c)
           pure (listToMaybe [zero + s | (s, _) <- changes], [])
-        maybe (pure ()) (\s -> sleepUntil s >> wake) next
+        maybe (pure ()) (\s -> sleepUntil s >> wake) next -- (in constant stack; 'for_' is not)
       valueOr none = (readTVar made >>= check) >> readTVar (current c) >>= maybe none pure
       noneAnyMore = failWith (nameOf c ++ " has no value any more")
   pure
