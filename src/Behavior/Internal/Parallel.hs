@@ -20,7 +20,7 @@ module Behavior.Internal.Parallel
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally, throwIO)
-import Control.Monad (filterM, foldM, void, (<=<))
+import Control.Monad (filterM, foldM, void, (<=<), (<$!>))
 import Data.Foldable (asum, toList)
 import Data.Maybe (isJust, listToMaybe)
 import Data.Traversable (for, mapAccumL)
@@ -91,7 +91,7 @@ both left right = structured $ \scope -> do
   l <- branch scope (Label "both" "left") (void left)
   r <- branch scope (Label "both" "right") (void right)
   let -- The left one first: when that has ended, it has also when the other is looked at.
-      atAGlance = outcomeNow l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$> outcomeNow r)
+      atAGlance = outcomeNow l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$!> outcomeNow r)
       atOnce = verdict <$> outcomeSoFar l <*> outcomeSoFar r
   unlessAtAGlance atAGlance (atomically (atOnce >>= maybe retry pure))
  where

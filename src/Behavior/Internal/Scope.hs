@@ -49,6 +49,7 @@ import Control.Exception
   , SomeException (..)
   , asyncExceptionFromException
   , asyncExceptionToException
+  , catch
   , mask
   , mask_
   , onException
@@ -59,7 +60,7 @@ import Control.Exception
 import Control.Monad (filterM, unless)
 import Data.Foldable (for_)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
-import Data.Maybe (isJust, isNothing)
+import Data.Maybe (isJust)
 
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime
@@ -114,27 +115,24 @@ structured body = mask $ \restore -> do
   -- (As @body scope@ it would be a thunk first, in every operator.)
   verdict <- try (restore (pure scope >>= body))
   faults <- end scope
-  -- A cancellation that came while the branches were stopping arrives here, and
-  -- not when the outcome has been thrown into some handler of the caller's.
-  cancelled <- case verdict of
-    Left e | isCancellation e -> pure (Left e)
-    _ -> try (restore checkpoint)
-  case (cancelled, faults) of
-    (Left cancellation, []) -> throwIO cancellation
-    (Left cancellation, fault : _) -> throwIO (StoppedWithFault cancellation fault)
-    (Right (), fault : _) -> throwIO fault
-    (Right (), []) -> either throwIO id verdict
+  case (verdict, faults) of
+    (Left e, []) | isCancellation e -> throwIO e
+    (Left e, fault : _) | isCancellation e -> throwIO (StoppedWithFault e fault)
+    -- A cancellation that came while the branches were stopping arrives here, and
+    -- not when the outcome has been thrown into some handler of the caller's.
+    (_, []) -> restore checkpoint >> either throwIO id verdict
+    (_, fault : _) -> do
+      restore checkpoint `catch` \cancellation -> throwIO (StoppedWithFault cancellation fault)
+      throwIO fault
 
 -- | Stops everything in the scope, and gives the faults from left to right.
 end :: Scope -> IO [SomeException]
 end (Scope branches) = do
   started <- reverse <$> readIORef branches
-  running <- filterM isRunning started
   -- Nothing may interrupt this, or the rest would be orphaned.
-  unless (null running) $ uninterruptibleMask_ (ask running)
+  uninterruptibleMask_ (ask started)
   faults started
  where
-  isRunning (SomeBranch b) = isNothing <$> outcomeNow b
   faults [] = pure []
   faults (SomeBranch b : others) =
     endedFirmly b >>= \case
