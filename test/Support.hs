@@ -174,6 +174,10 @@ throwing :: Exception e => ThreadId -> e -> IO ()
 throwing target e = do
   thrower <- forkIO (throwTo target e)
   eventually $ (`elem` [ThreadBlocked BlockedOnException, ThreadFinished]) <$> threadStatus thrower
+  -- It may be under way yet, to another capability (and to one more, if the thread was
+  -- moved meanwhile). Each reads what was sent to it before it runs a thread sent later.
+  capabilities <- getNumCapabilities
+  for_ (concat (replicate 2 [1 .. capabilities])) $ \c -> forkOn c (pure ()) >>= awaitOver
 
 awaitEnd :: Async a -> IO (Ending a)
 awaitEnd caller = endingOf <$> waitCatch caller
