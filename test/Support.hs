@@ -60,7 +60,7 @@ import Control.Concurrent
 import Control.Concurrent.Async (Async, asyncThreadId, poll, waitCatch, withAsync)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
-import Control.Monad (unless)
+import Control.Monad (replicateM_, unless)
 import Data.Foldable (for_, traverse_)
 import Data.Maybe (isNothing)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
@@ -177,7 +177,7 @@ throwing target e = do
   -- It may be under way yet, to another capability (and to one more, if the thread was
   -- moved meanwhile). Each reads what was sent to it before it runs a thread sent later.
   capabilities <- getNumCapabilities
-  for_ (concat (replicate 2 [1 .. capabilities])) $ \c -> forkOn c (pure ()) >>= awaitOver
+  replicateM_ 2 . for_ [1 .. capabilities] $ \c -> forkOn c (pure ()) >>= awaitOver
 
 awaitEnd :: Async a -> IO (Ending a)
 awaitEnd caller = endingOf <$> waitCatch caller

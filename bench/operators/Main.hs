@@ -7,10 +7,12 @@
 module Main (main) where
 
 import Control.Concurrent (newEmptyMVar, putMVar, runInUnboundThread, takeMVar, threadDelay)
-import Control.Concurrent.Async (concurrently_, race, withAsync)
+import Control.Concurrent.Async (Concurrently (..), concurrently_, mapConcurrently_, race, withAsync)
 import Control.Concurrent.STM (TVar, newTVarIO, readTVar, writeTVar)
+import qualified Control.Concurrent.STM as STM
 import Control.Exception (throwIO, try)
 import Control.Monad (forM_, replicateM, replicateM_, void, when)
+import Data.Foldable (asum)
 import Data.IORef (IORef, newIORef, readIORef, writeIORef)
 import System.Environment (getArgs)
 import System.Exit (die)
@@ -28,7 +30,7 @@ main =
     getArgs >>= \case
       [] -> measureOperators
       ["fallback"] -> measureAll trying
-      ["idle"] -> mapM_ measureIdle [10, 100, 1000]
+      ["idle"] -> measureBareIdle >> mapM_ measureIdle [10, 100, 1000]
       _ -> die "usage: operators [fallback | idle]"
 
 measureOperators :: IO ()
@@ -110,6 +112,14 @@ many blocked =
       ]
     | n <- [2, 10, 100, 1000]
     ]
+    ++ concat
+      [ [ each ("asum of Concurrently " ++ show n) (40000 `div` n) $
+            runConcurrently (asum (map Concurrently (succeeds : replicate (n - 1) blocked)))
+        , each ("mapConcurrently_ " ++ show n) (40000 `div` n) (mapConcurrently_ id (replicate n succeeds))
+        , Case ("a look at variables " ++ show n) (100000 `div` n) (looksAt n)
+        ]
+      | n <- [10, 100, 1000]
+      ]
     ++ [Case ("teleoReactive " ++ show n) (100000 `div` n) (changes blocked n) | n <- [10, 100, 1000]]
 
 -- | So many changes of the first rule that holds: from the last rule to the one in the
@@ -122,6 +132,13 @@ changes blocked rules times = do
       turning to = unlessOver left (set middle to >> blocked)
   Signal.teleoReactive $
     [(watch flag, turning False) | flag <- init flags] ++ [(pure True, turning True)]
+
+-- | What a change takes several times, besides the stop and the start of a branch: all the
+-- conditions seen at one moment.
+looksAt :: Int -> Int -> Behavior ()
+looksAt n times = do
+  flags <- replicateM n (newTVarIO False)
+  replicateM_ times (STM.atomically (mapM_ readTVar flags))
 
 -- | Counts down, and completes at the end.
 unlessOver :: IORef Int -> Behavior () -> Behavior ()
@@ -159,17 +176,29 @@ measure (Case name times act) = do
   ended <- time
   line name ((ended - begun) / fromIntegral times)
 
--- | Seconds of the processor's time in a second in which nothing changes.
+-- | Ordered rules of which nothing changes.
 measureIdle :: Int -> IO ()
 measureIdle rules = do
   flags <- replicateM rules (newTVarIO False)
-  withAsync (Signal.teleoReactive [(watch flag, succeeds) | flag <- flags]) . const $ do
+  idling ("teleoReactive idle cpu " ++ show rules) (Signal.teleoReactive [(watch flag, succeeds) | flag <- flags])
+  -- In reach to the end.
+  forM_ flags (`set` True)
+
+-- | A thread that waits, and nothing else.
+measureBareIdle :: IO ()
+measureBareIdle = do
+  flag <- newTVarIO False
+  idling "bare thread idle cpu" (STM.atomically (readTVar flag >>= STM.check))
+  set flag True
+
+-- | Seconds of the processor's time in a second in which the behaviour waits.
+idling :: String -> Behavior () -> IO ()
+idling name behavior =
+  withAsync behavior . const $ do
     -- For some time after anything has run, now and at the end, the runtime's clock ticks
     -- and it collects its garbage.
     threadDelay 500000
     before <- processorTime
     threadDelay 4000000
     after <- processorTime
-    line ("teleoReactive idle cpu " ++ show rules) ((after - before) / 4e9)
-  -- In reach to the end.
-  forM_ flags (`set` True)
+    line name ((after - before) / 4e9)

@@ -45,18 +45,19 @@ manyBranches =
       [ ["firstOf" `of'` n `within` 1.2 `times` scaled (n / 2) "firstOf 2" | n <- [10, 100, 1000]]
       , ["allOf" `of'` n `within` 1.2 `times` scaled (n / 2) "allOf 2" | n <- [10, 100, 1000]]
       , [operator `of'` 100 `atMost` 60 * microseconds | operator <- ["firstOf", "allOf"]]
+      , [told (primitive `of'` n) | primitive <- ["asum of Concurrently", "mapConcurrently_"], n <- [10, 100, 1000]]
       ]
 rules =
-  operators
-    "Ordered rules, a change: nanoseconds"
+  operators "Ordered rules, a change: nanoseconds" $
     [ "teleoReactive" `of'` n `within` share `times` (peer ++ " rules tick") `of'` n
     | (peer, share) <- [("bonsai", 1 / 3), ("py_trees", 1)]
     , n <- [10, 100, 1000]
     ]
+      ++ [told ("a look at variables" `of'` n) | n <- [10, 100, 1000]]
 standingStill =
   operators
     "Ordered rules, no change: seconds of the processor a second"
-    ["teleoReactive idle cpu" `of'` n `atMost` 0.001 | n <- [10, 100, 1000]]
+    (told "bare thread idle cpu" : ["teleoReactive idle cpu" `of'` n `atMost` 0.001 | n <- [10, 100, 1000]])
 longPrograms =
   operators
     "100,000 steps: nanoseconds a step"
