@@ -178,7 +178,7 @@ unasked (SomeBranch (Branch _ asked outcome)) = do
   if over then pure False else not <$> atomicModifyIORef' asked (\was -> (True, was))
 
 askByMessenger :: SomeBranch -> IO ()
-askByMessenger (SomeBranch (Branch thread _ _)) = interruptByMessengers [(thread, Stop thread)]
+askByMessenger (SomeBranch (Branch thread _ _)) = interruptByMessengers Stop [thread]
 
 outcomeOf :: Branch a -> STM (Outcome a)
 outcomeOf (Branch _ _ outcome) = outcome

@@ -121,7 +121,7 @@ calling stage change deeds act = do
   for_ deeds $ \(after, deed) -> do
     pause stage after
     case deed of
-      CancelsIt -> interruptByMessengers [(threadId caller, Cancel "the caller")]
+      CancelsIt -> interruptByMessengers (const (Cancel "the caller")) [threadId caller]
       Changes world -> change world
   endingOf <$> atomically (threadEnd caller)
 

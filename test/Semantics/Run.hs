@@ -128,7 +128,7 @@ behavior tell world = do
     Operator -> firstOf [played, timeIsUp <$ environment stage]
     Stranger later -> do
       thread <- mask_ (start (Sim.Label "stranger" "") played)
-      let interrupting = interruptByMessengers [(threadId thread, Enough)]
+      let interrupting = interruptByMessengers (const Enough) [threadId thread]
       environment stage
       interrupting
       sleepUntil (fromIntegral (patience world + later))

@@ -161,7 +161,7 @@ stopped = do
       act <- action mock "act" [script]
       _ <- simulate $ do
         thread <- mask_ (start (Label "test" "act") act)
-        replicateM_ 3 $ sleep 1 >> interruptByMessengers [(threadId thread, Cancel "again")]
+        replicateM_ 3 $ sleep 1 >> interruptByMessengers (const (Cancel "again")) [threadId thread]
         atomically (threadEnd thread)
       map (\e -> (happenedAt e, happening e)) . entries <$> happened mock
         `shouldReturn` [(0, Begins), (1, AskedToStop), (t, end)]

@@ -22,7 +22,7 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally, throwIO)
 import Control.Monad (filterM, foldM, void, (<=<), (<$!>))
 import Data.Foldable (asum, toList)
-import Data.Maybe (isJust, listToMaybe)
+import Data.Maybe (isJust)
 import Data.Traversable (for, mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, failed)
@@ -54,8 +54,12 @@ import Behavior.Internal.Scope
 --
 -- @since 0.1.0.0
 parallel :: Behavior a -> Behavior b -> Behavior ()
-parallel left right = race $ \scope ->
-  sequence [branch scope (Label "parallel" "left") (void left), branch scope (Label "parallel" "right") (void right)]
+parallel left right = structured $ \scope -> do
+  l <- branch scope (Label "parallel" "left") (void left)
+  r <- branch scope (Label "parallel" "right") (void right)
+  -- At a glance only the left one: of the other it could not be said that the left one had
+  -- not ended before.
+  settle <$> unlessAtAGlance (outcomeNow l) (atomically (outcomeSoFar l >>= maybe (outcome r) pure))
 
 -- | 'parallel' as an operator. It binds looser than @?@ and tighter than
 -- 'Prelude.>>'. (@Control.Arrow@ has another function of this name.)
@@ -118,7 +122,10 @@ both left right = structured $ \scope -> do
 -- @since 0.1.0.0
 firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
-firstOf behaviors = race $ \scope -> startAll (branch scope . Label "firstOf") behaviors
+firstOf behaviors = structured $ \scope -> do
+  first <- newTVarIO Nothing
+  void $ startAll (\n -> branchThen (tell first n) scope (Label "firstOf" (show n))) behaviors
+  either throwIO pure <$> unlessAtAGlance (toldNow first) (atomically (told first))
 
 -- | Starts all at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
@@ -134,18 +141,16 @@ firstOf behaviors = race $ \scope -> startAll (branch scope . Label "firstOf") b
 -- @since 0.1.0.0
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
 allOf behaviors = structured $ \scope -> do
-  -- One variable tells of trouble anywhere, so that waiting for n branches takes
-  -- n looks at two variables, and not n looks at n.
-  trouble <- newTVarIO False
-  branches <- startAll (branchThen (troubling trouble) scope . Label "allOf") (toList behaviors)
+  trouble <- newTVarIO Nothing
+  branches <- startAll (\n -> branchThen (tellTrouble trouble n) scope (Label "allOf" (show n))) (toList behaviors)
   let waiting [] = pure (refilled behaviors <$> traverse (settle <=< ended) branches)
       waiting (b : bs) = do
-        quiet <-
-          unlessAtAGlance ((True <$) <$> completedNow b) . atomically $
+        wrong <-
+          unlessAtAGlance ((Nothing <$) <$> completedNow b) . atomically $
             outcomeSoFar b >>= \case
-              Just (Completed _) -> pure True
-              _ -> False <$ (readTVar trouble >>= check)
-        if quiet then waiting bs else throwIO <$> atomically (leftmostWrong branches)
+              Just (Completed _) -> pure Nothing
+              _ -> Just <$> told trouble
+        maybe (waiting bs) (pure . throwIO) wrong
   waiting branches
 
 -- | The container, with these (as many) for its elements.
@@ -159,23 +164,33 @@ refilled container = snd . flip (mapAccumL next) container
 --
 -- In constant stack: after each start GHC may turn to another thread, and before that it
 -- walks through all of this one's stack.
-startAll :: (String -> Behavior a -> IO (Branch a)) -> [Behavior a] -> IO [Branch a]
-startAll starting = fmap reverse . foldM next [] . zip [1 :: Int ..]
+startAll :: (Int -> Behavior a -> IO (Branch a)) -> [Behavior a] -> IO [Branch a]
+startAll starting = fmap reverse . foldM next [] . zip [1 ..]
  where
-  next started (n, act) = (: started) <$> starting (show n) act
+  next started (n, act) = (: started) <$> starting n act
 
-race :: (Scope -> IO [Branch a]) -> Behavior a
-race starting = structured $ \scope -> do
-  branches <- starting scope
-  settle <$> unlessAtAGlance (leftNow branches) (atomically (leftmost branches))
- where
-  -- Only the left one: of the others it could not be said that the left one had not
-  -- ended before.
-  leftNow = maybe (pure Nothing) outcomeNow . listToMaybe
+-- | Where branches tell something, each with its place, and the leftmost counts. To wait
+-- for the first of n is so to look at one variable, and not at n.
+type Told x = TVar (Maybe (Int, x))
 
--- | Tells of trouble if a branch threw.
-troubling :: TVar Bool -> Either SomeException a -> STM ()
-troubling trouble = either (\_ -> writeTVar trouble True) (\_ -> pure ())
+-- | Tells, unless one further left has told.
+tell :: Told x -> Int -> x -> STM ()
+tell leftmost n x =
+  readTVar leftmost >>= \case
+    Just (m, _) | m < n -> pure ()
+    _ -> writeTVar leftmost (Just (n, x))
+
+-- | Tells what a branch threw, if it did.
+tellTrouble :: Told SomeException -> Int -> Either SomeException a -> STM ()
+tellTrouble trouble n = either (tell trouble n) (\_ -> pure ())
+
+-- | What was told; retries until something was.
+told :: Told x -> STM x
+told leftmost = readTVar leftmost >>= maybe retry (pure . snd)
+
+-- | The same, at a glance.
+toldNow :: Told x -> IO (Maybe x)
+toldNow leftmost = fmap snd <$> readTVarIO leftmost
 
 -- | A place where behaviours run beside a 'scoped' one.
 --
@@ -222,24 +237,23 @@ scoped body = do
     `finally` atomically (writeTVar requests Closed)
  where
   serving requests scope = do
-    trouble <- newTVarIO False
+    trouble <- newTVarIO Nothing
     main <- branch scope (Label "scoped" "body") (body (Nursery requests))
-    let -- The children that live, or died of something, the newest first; and at how many
-        -- to look next for those that are no more.
-        serve limit children = do
-          next <- atomically (asum [Left . settle <$> outcome main, Left <$> alarm, Right <$> arrived])
+    let -- How many were forked; those of them that live, or died of something, the newest
+        -- first; and at how many to look next for those that are no more.
+        serve count children limit = do
+          next <- atomically (asum [Left . settle <$> outcome main, Left . throwIO <$> told trouble, Right <$> arrived])
           case next of
             Left verdict -> pure verdict
             Right new -> do
-              forked <- for new $ \(Request act accepted) ->
-                branchThen (troubling trouble) scope (Label "scoped" "fork") act
+              forked <- for (zip [count + 1 ..] new) $ \(n, Request act accepted) ->
+                branchThen (tellTrouble trouble n) scope (Label "scoped" "fork") act
                   <* atomically (putTMVar accepted ())
               let family = reverse forked ++ children
+                  more = serve (count + length new)
               if length family < limit
-                then serve limit family
-                else filterM alive family >>= \living -> serve (max 16 (2 * length living)) living
-         where
-          alarm = readTVar trouble >>= check >> throwIO <$> leftmostWrong (reverse children)
+                then more family limit
+                else filterM alive family >>= \living -> more living (max 16 (2 * length living))
         arrived =
           readTVar requests >>= \case
             Open new@(_ : _) -> reverse new <$ writeTVar requests (Open [])
@@ -247,7 +261,7 @@ scoped body = do
         alive child = do
           over <- isJust <$> completedNow child
           if over then False <$ forget scope child else pure True
-    serve 16 []
+    serve 0 [] 16
 
 -- | Starts a behaviour that runs until it ends by itself, or 'scoped' ends. The
 -- transaction that it returns waits for the result.

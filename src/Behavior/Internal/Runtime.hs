@@ -169,9 +169,9 @@ interrupt thread e =
 --
 -- One messenger does all the errands, until it has to wait. Then there is another for those
 -- that are left.
-interruptByMessengers :: Exception e => [(ThreadId, e)] -> IO ()
-interruptByMessengers errands =
-  inSimulation byMessenger $ \simulation -> for_ errands $ \(thread, e) -> send simulation thread (toException e)
+interruptByMessengers :: Exception e => (ThreadId -> e) -> [ThreadId] -> IO ()
+interruptByMessengers what errands =
+  inSimulation byMessenger $ \simulation -> for_ errands $ \thread -> send simulation thread (toException (what thread))
  where
   byMessenger = newIORef errands >>= hire
   hire left =
@@ -183,9 +183,11 @@ interruptByMessengers errands =
         yield
         hire left
   carry left =
-    atomicModifyIORef' left (\these -> (drop 1 these, take 1 these)) >>= \case
-      [] -> pure ()
-      these -> for_ these (uncurry throwTo) >> carry left
+    atomicModifyIORef' left next >>= \case
+      Nothing -> pure ()
+      Just thread -> throwTo thread (what thread) >> carry left
+  next [] = ([], Nothing)
+  next (thread : others) = (others, Just thread)
 
 -- | How many threads started by 'start' have not ended.
 living :: IO Int

@@ -22,8 +22,6 @@ module Behavior.Internal.Scope
   , outcome
   , outcomeSoFar
   , outcomeNow
-  , leftmost
-  , leftmostWrong
   , ended
   , SomeBranch (..)
   , branch
@@ -43,7 +41,7 @@ module Behavior.Internal.Scope
   ) where
 
 import Control.Concurrent (ThreadId)
-import Control.Concurrent.STM (STM, retry)
+import Control.Concurrent.STM (STM)
 import Control.Exception
   ( Exception (..)
   , SomeException (..)
@@ -57,8 +55,8 @@ import Control.Exception
   , try
   , uninterruptibleMask_
   )
-import Control.Monad (filterM, unless)
-import Data.Foldable (for_)
+import Control.Monad (foldM)
+import Data.Foldable (foldl')
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
@@ -85,10 +83,6 @@ outcome b = ending b <$> threadEnd (branchThread b)
 -- the same as 'orElse' between their outcomes, without its nested transactions.)
 outcomeSoFar :: Branch a -> STM (Maybe (Outcome a))
 outcomeSoFar b = fmap (ending b) <$> threadEndSoFar (branchThread b)
-
--- | How the leftmost branch ended that has ended; retries until one has.
-leftmost :: [Branch a] -> STM (Outcome a)
-leftmost = foldr (\b others -> outcomeSoFar b >>= maybe others pure) retry
 
 branchId :: Branch a -> ThreadId
 branchId = threadId . branchThread
@@ -191,31 +185,33 @@ instead old new = without
 -- Whoever waits for that can be interrupted, if it lets itself be. Then that last one
 -- counts as not asked.
 ask :: [SomeBranch] -> IO ()
-ask branches = mask_ $ do
-  toAsk <- filterM marked branches
-  for_ (unsnoc toAsk) $ \(others, SomeBranch b) -> do
-    askByMessengers others
-    interrupt (branchId b) (stopping b) `onException` writeIORef (branchAsked b) False
- where
-  unsnoc [] = Nothing
-  unsnoc bs = Just (init bs, last bs)
+ask branches =
+  mask_ $
+    marked branches >>= \case
+      [] -> pure ()
+      SomeBranch b : others -> do
+        askByMessengers others
+        interrupt (branchId b) (stopping b) `onException` writeIORef (branchAsked b) False
 
 -- | Asks branches to stop, all at once, and does not wait for any to hear it.
 askWithoutWaiting :: [SomeBranch] -> IO ()
-askWithoutWaiting branches = mask_ (filterM marked branches >>= askByMessengers)
+askWithoutWaiting branches = mask_ (marked branches >>= askByMessengers)
 
+-- | Asks branches that are marked, of which the last comes first, from left to right.
 askByMessengers :: [SomeBranch] -> IO ()
-askByMessengers branches = interruptByMessengers [(branchId b, stopping b) | SomeBranch b <- branches]
+askByMessengers = interruptByMessengers Stop . foldl' (\threads (SomeBranch b) -> branchId b : threads) []
 
 stopping :: Branch a -> Stop
 stopping = Stop . branchId
 
--- | Marks a branch as asked. False if it was asked before, or has ended.
-marked :: SomeBranch -> IO Bool
-marked (SomeBranch b) = do
-  needless <- (||) <$> (isJust <$> outcomeNow b) <*> readIORef (branchAsked b)
-  unless needless $ writeIORef (branchAsked b) True
-  pure (not needless)
+-- | Marks those as asked that have not ended, and have not been asked before; and gives
+-- them, the last first.
+marked :: [SomeBranch] -> IO [SomeBranch]
+marked = foldM mark []
+ where
+  mark others new@(SomeBranch b) = do
+    needless <- (||) <$> (isJust <$> outcomeNow b) <*> readIORef (branchAsked b)
+    if needless then pure others else (new : others) <$ writeIORef (branchAsked b) True
 
 -- | Waits for the end of the branch.
 ended :: Branch a -> IO (Outcome a)
@@ -228,11 +224,6 @@ outcomeNow b = fmap (ending b) <$> threadEndNow (branchThread b)
 -- | What the branch has returned, if it has.
 completedNow :: Branch a -> IO (Maybe a)
 completedNow b = (>>= either (const Nothing) Just . result) <$> outcomeNow b
-
--- | What the leftmost branch threw that has ended and has not completed; retries until one
--- has.
-leftmostWrong :: [Branch a] -> STM SomeException
-leftmostWrong = foldr (\b others -> outcomeSoFar b >>= maybe others (either pure (const others) . result)) retry
 
 -- | The action that an outcome stands for.
 settle :: Outcome a -> IO a
