@@ -138,7 +138,15 @@ possible which isCancelled cast
 isTie :: Kind -> [Actor] -> Bool
 isTie which cast = length (deciding which cast) > 1
 
+-- | In which order those end who end by themselves.
+data Order = FromTheLeft | FromTheRight
+  deriving (Bounded, Enum)
+
 -- | Plays it, and says how the operator ended.
+enact :: Operator -> Bool -> [Actor] -> IO (Ending [Int])
+enact = enactIn FromTheLeft
+
+-- | The same, and those who end by themselves do so in that order.
 --
 -- Where ties can be forced ('forcesTies') the operator gets its behaviours in a list
 -- whose end, which it comes to before it first looks, is there only when all have
@@ -146,8 +154,8 @@ isTie which cast = length (deciding which cast) > 1
 -- one decides. Those who are stopped wait, in their cleanup, until all of them have
 -- heard of it, and the caller has still not returned; and if the caller is to be
 -- cancelled as well as somebody decides, that is when it happens.
-enact :: Operator -> Bool -> [Actor] -> IO (Ending [Int])
-enact operator isCancelled cast = do
+enactIn :: Order -> Operator -> Bool -> [Actor] -> IO (Ending [Int])
+enactIn order operator isCancelled cast = do
   stage <- forM cast $ \actor ->
     (,,,) actor <$> newGate <*> newGate <*> newEmptyMVar
   mayEnd <- newGate
@@ -168,8 +176,11 @@ enact operator isCancelled cast = do
             end e
         enter = myThreadId >>= putMVar there
       onStage = for_ stage $ \(_, _, _, there) -> readMVar there
-      endAlone which = for_ stage $ \(actor, cue, _, there) ->
+      endAlone which = for_ (ordered stage) $ \(actor, cue, _, there) ->
         when (which actor) $ open cue >> readMVar there >>= awaitOver
+      ordered = case order of
+        FromTheLeft -> id
+        FromTheRight -> reverse
       isDeciding actor = name actor `elem` map name (deciding (kind operator) cast)
       toBeStopped = [cleaning | (actor, _, cleaning, _) <- stage, not (endsAlone (fate actor))]
   atTheEnd <- unsafeInterleaveIO $ do
@@ -208,20 +219,22 @@ outcomes operator = describe (called operator) $ do
             bad -> bad
       when (possible (kind operator) isCancelled cast && (forcesTies operator || not (isTie (kind operator) cast))) $
         it (sentence one other isCancelled) $
-          enact operator isCancelled cast `shouldReturn` end
+          for_ orders $ \order -> enactIn order operator isCancelled cast `shouldReturn` end
   when (forcesTies operator) $
     it "ends as the design says, however many behaviours there are" $
       property $ \isCancelled ->
         forAll (actors <$> (choose (1, 6) >>= \n -> vectorOf n arbitrary)) $ \cast ->
           possible (kind operator) isCancelled cast
-            ==> ioProperty ((=== predicted (kind operator) isCancelled cast) <$> enact operator isCancelled cast)
+            ==> ioProperty (allAre (predicted (kind operator) isCancelled cast) <$> traverse (\order -> enactIn order operator isCancelled cast) orders)
  where
+  orders = [minBound .. maxBound]
+  allAre end = conjoin . map (=== end)
   all' = [minBound .. maxBound]
   sentence one other isCancelled =
     fst (members operator) ++ " " ++ saying one ++ ", " ++ snd (members operator) ++ " " ++ saying other
       ++ (if isCancelled then ", and the caller is cancelled" else "")
 
--- | Nothing outside can make 'parallel' and 'both' look only when both behaviours
+-- | Nothing outside can make 'parallel', 'both' and 'scoped' look only when both behaviours
 -- have ended. But with one capability, when one transaction wakes both, they come
 -- before the caller in the queue of those who may run, unless the end of a time
 -- slice falls between them. So it is a tie nearly always; an operator for which the
@@ -235,7 +248,15 @@ ties = do
     mostly parallel (failWith "left") (failWith "right") (FailedWith (show (FailedBecause "left")))
   it "both: the left one's failure counts when both have failed" $
     mostly both (failWith "left") (failWith "right") (FailedWith (show (FailedBecause "left")))
+  it "scoped: of those forked, the failure of the first forked counts when both have failed" $
+    mostly forking (failWith "left") (failWith "right") (FailedWith (show (FailedBecause "left")))
+  it "parallel and both: also when both have ended before it is waited for" $
+    for_ [parallel, both] $ \operator -> onOneCapability $ do
+      ends <- replicateM 50 (ending (operator (failWith "left") (failWith "right" :: IO ()) :: IO ()))
+      length (filter (== FailedWith (show (FailedBecause "left"))) ends) `shouldSatisfy` (> 25)
  where
+  forking :: Behavior a -> Behavior b -> Behavior ()
+  forking one other = scoped $ \nursery -> fork nursery one >> fork nursery other >> hang
   mostly operator left right end = onOneCapability $ do
     ends <- replicateM 50 $ do
       leftThere <- newEmptyMVar
