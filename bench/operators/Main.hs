@@ -6,7 +6,7 @@
 -- tool that measures one thing after the other would give each a mood of its own.)
 module Main (main) where
 
-import Control.Concurrent (newEmptyMVar, putMVar, runInUnboundThread, takeMVar, threadDelay)
+import Control.Concurrent (forkIO, killThread, newEmptyMVar, putMVar, runInUnboundThread, takeMVar, threadDelay, yield)
 import Control.Concurrent.Async (Concurrently (..), concurrently_, mapConcurrently_, race, withAsync)
 import Control.Concurrent.STM (TVar, newTVarIO, readTVar, writeTVar)
 import qualified Control.Concurrent.STM as STM
@@ -35,14 +35,17 @@ main =
 
 measureOperators :: IO ()
 measureOperators = do
-  never <- newEmptyMVar
+  nevers <- replicateM 1100 newEmptyMVar
   quiet <- newTVarIO False
   state <- newIORef 0
-  let blocked = takeMVar never
+  -- Each waits for something of its own: after those who wait for the same, and are stopped,
+  -- GHC may leave a queue that keeps them in memory.
+  let waits = map takeMVar nevers
+      blocked = head waits
       steps = [looks state n | n <- [1 .. 100000]]
-  measureAll (pairs blocked ++ watched quiet blocked ++ many blocked ++ long steps)
+  measureAll (pairs blocked ++ watched quiet blocked ++ many waits ++ long steps)
   -- In reach to the end, or they who wait for it would be told that it never comes.
-  putMVar never ()
+  mapM_ (`putMVar` ()) nevers
 
 -- | There and back: to come second makes a difference of a tenth to what is so short.
 measureAll :: [Case] -> IO ()
@@ -104,23 +107,40 @@ interruptions blocked times = do
   left <- newIORef times
   Signal.monitor (watch low) (set low False) (unlessOver left (set low True >> blocked))
 
-many :: Behavior () -> [Case]
-many blocked =
+many :: [Behavior ()] -> [Case]
+many waits =
   concat
-    [ [ each ("firstOf " ++ show n) (40000 `div` n) (firstOf (succeeds : replicate (n - 1) blocked))
-      , each ("allOf " ++ show n) (40000 `div` n) (allOf (replicate n succeeds))
+    [ [ about n "firstOf" (\size -> firstOf (succeeds : take (size - 1) waits))
+      , about n "firstOf, the last ends" (\size -> firstOf (take (size - 1) waits ++ [succeeds]))
+      , about n "allOf" (\size -> void (allOf (replicate size succeeds)))
+      , about n "bare threads, stopped" (stopping . (`take` waits))
       ]
     | n <- [2, 10, 100, 1000]
     ]
     ++ concat
-      [ [ each ("asum of Concurrently " ++ show n) (40000 `div` n) $
-            runConcurrently (asum (map Concurrently (succeeds : replicate (n - 1) blocked)))
-        , each ("mapConcurrently_ " ++ show n) (40000 `div` n) (mapConcurrently_ id (replicate n succeeds))
+      [ [ about n "asum of Concurrently" $ \size ->
+            runConcurrently (asum (map Concurrently (succeeds : take (size - 1) waits)))
+        , about n "mapConcurrently_" (\size -> mapConcurrently_ id (replicate size succeeds))
         , Case ("a look at variables " ++ show n) (100000 `div` n) (looksAt n)
         ]
       | n <- [10, 100, 1000]
       ]
-    ++ [Case ("teleoReactive " ++ show n) (100000 `div` n) (changes blocked n) | n <- [10, 100, 1000]]
+    ++ [Case ("teleoReactive " ++ show n) (100000 `div` n) (changes (head waits) n) | n <- [10, 100, 1000]]
+
+-- | So many, give or take a tenth: of just so many the collector might meet each at the same
+-- moment of its life, the best or the worst.
+about :: Int -> String -> (Int -> Behavior ()) -> Case
+about n name act = Case (name ++ " " ++ show n) (21000 `div` n * 2) (\times -> mapM_ act (take times (cycle sizes)))
+ where
+  sizes = [n - n `div` 10, n - n `div` 10 + max 1 (n `div` 100) .. n + n `div` 10]
+
+-- | What 'firstOf' cannot do without: threads that are started, wait, and are stopped.
+stopping :: [Behavior ()] -> Behavior ()
+stopping waits = do
+  threads <- mapM forkIO waits
+  yield
+  mapM_ killThread threads
+  yield
 
 -- | So many changes of the first rule that holds: from the last rule to the one in the
 -- middle, whose condition comes and goes, and back.

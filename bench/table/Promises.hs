@@ -42,10 +42,12 @@ reacting =
 manyBranches =
   operators "Many at once, and n/2 times the cost for 2: nanoseconds" $
     concat
-      [ ["firstOf" `of'` n `within` 1.2 `times` scaled (n / 2) "firstOf 2" | n <- [10, 100, 1000]]
-      , ["allOf" `of'` n `within` 1.2 `times` scaled (n / 2) "allOf 2" | n <- [10, 100, 1000]]
+      [ [ operator `of'` n `within` 1.2 `times` scaled (n / 2) (operator `of'` 2)
+        | operator <- ["firstOf", "firstOf, the last ends", "allOf"]
+        , n <- [10, 100, 1000]
+        ]
       , [operator `of'` 100 `atMost` 60 * microseconds | operator <- ["firstOf", "allOf"]]
-      , [told (primitive `of'` n) | primitive <- ["asum of Concurrently", "mapConcurrently_"], n <- [10, 100, 1000]]
+      , [told (primitive `of'` n) | primitive <- ["bare threads, stopped", "asum of Concurrently", "mapConcurrently_"], n <- [10, 100, 1000]]
       ]
 rules =
   operators "Ordered rules, a change: nanoseconds" $

@@ -57,9 +57,10 @@ import Control.Exception
   )
 import Control.Monad (when)
 import Data.Foldable (for_)
-import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
+import Data.IORef (IORef, newIORef, readIORef, writeIORef)
 import GHC.Clock (getMonotonicTime)
 import GHC.Conc (labelThread)
+import GHC.IORef (atomicModifyIORef'_)
 import System.IO.Unsafe (unsafePerformIO)
 
 #if !MIN_VERSION_base(4,18,0)
@@ -183,11 +184,9 @@ interruptByMessengers what errands =
         yield
         hire left
   carry left =
-    atomicModifyIORef' left next >>= \case
-      Nothing -> pure ()
-      Just thread -> throwTo thread (what thread) >> carry left
-  next [] = ([], Nothing)
-  next (thread : others) = (others, Just thread)
+    atomicModifyIORef'_ left (drop 1) >>= \case
+      ([], _) -> pure ()
+      (thread : _, _) -> throwTo thread (what thread) >> carry left
 
 -- | How many threads started by 'start' have not ended.
 living :: IO Int

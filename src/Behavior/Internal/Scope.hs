@@ -125,13 +125,12 @@ end (Scope branches) = do
   started <- reverse <$> readIORef branches
   -- Nothing may interrupt this, or the rest would be orphaned.
   uninterruptibleMask_ (ask started)
-  faults started
+  reverse <$> foldM withFault [] started
  where
-  faults [] = pure []
-  faults (SomeBranch b : others) =
+  withFault others (SomeBranch b) =
     endedFirmly b >>= \case
-      Faulted e -> (e :) <$> faults others
-      _ -> faults others
+      Faulted e -> pure (e : others)
+      _ -> pure others
   endedFirmly b = unlessAtAGlance (outcomeNow b) (firmly (atomically (outcome b)))
 
 -- | Starts a branch.
@@ -210,8 +209,9 @@ marked :: [SomeBranch] -> IO [SomeBranch]
 marked = foldM mark []
  where
   mark others new@(SomeBranch b) = do
-    needless <- (||) <$> (isJust <$> outcomeNow b) <*> readIORef (branchAsked b)
-    if needless then pure others else (new : others) <$ writeIORef (branchAsked b) True
+    over <- isJust <$> threadEndNow (branchThread b)
+    asked <- readIORef (branchAsked b)
+    if over || asked then pure others else (new : others) <$ writeIORef (branchAsked b) True
 
 -- | Waits for the end of the branch.
 ended :: Branch a -> IO (Outcome a)
