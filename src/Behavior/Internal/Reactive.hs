@@ -124,7 +124,7 @@ interrupt engine sensors running = \case
         choose engine sensors seen later
       end -> pure (settle end)
  where
-  stopping others = ask (others ++ [SomeBranch running]) >> ended running
+  stopping others = ask (SomeBranch running : others) >> ended running
 
 -- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
 -- those that are slow to, but what comes after it does.

@@ -55,8 +55,7 @@ import Control.Exception
   , try
   , uninterruptibleMask_
   )
-import Control.Monad (foldM)
-import Data.Foldable (foldl')
+import Control.Monad (foldM, when)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
@@ -122,10 +121,10 @@ structured body = mask $ \restore -> do
 -- | Stops everything in the scope, and gives the faults from left to right.
 end :: Scope -> IO [SomeException]
 end (Scope branches) = do
-  started <- reverse <$> readIORef branches
+  newestFirst <- readIORef branches
   -- Nothing may interrupt this, or the rest would be orphaned.
-  uninterruptibleMask_ (ask started)
-  reverse <$> foldM withFault [] started
+  uninterruptibleMask_ (ask newestFirst)
+  reverse <$> foldM withFault [] (reverse newestFirst)
  where
   withFault others (SomeBranch b) =
     endedFirmly b >>= \case
@@ -178,40 +177,45 @@ instead old new = without
     | branchId b == branchId old = new ++ others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
--- | Asks branches to stop, all at once: none hears it later because another cannot
--- be interrupted just now. Returns when the last of the list has heard it.
+-- | Asks branches (the newest first) to stop, all at once: none hears it later because
+-- another cannot be interrupted just now. Returns when the newest has heard it.
 --
--- Whoever waits for that can be interrupted, if it lets itself be. Then that last one
+-- Whoever waits for that can be interrupted, if it lets itself be. Then that newest one
 -- counts as not asked.
 ask :: [SomeBranch] -> IO ()
-ask branches =
-  mask_ $
-    marked branches >>= \case
-      [] -> pure ()
-      SomeBranch b : others -> do
-        askByMessengers others
+ask = mask_ . asking
+ where
+  asking [] = pure ()
+  asking (SomeBranch b : older) = do
+    needed <- marked b
+    if needed
+      then do
+        askByMessengers older
         interrupt (branchId b) (stopping b) `onException` writeIORef (branchAsked b) False
+      else asking older
 
 -- | Asks branches to stop, all at once, and does not wait for any to hear it.
 askWithoutWaiting :: [SomeBranch] -> IO ()
-askWithoutWaiting branches = mask_ (marked branches >>= askByMessengers)
+askWithoutWaiting = mask_ . askByMessengers
 
--- | Asks branches that are marked, of which the last comes first, from left to right.
 askByMessengers :: [SomeBranch] -> IO ()
-askByMessengers = interruptByMessengers Stop . foldl' (\threads (SomeBranch b) -> branchId b : threads) []
+askByMessengers branches = foldM asked [] branches >>= interruptByMessengers Stop
+ where
+  asked threads (SomeBranch b) = do
+    needed <- marked b
+    pure $! if needed then branchId b : threads else threads
 
 stopping :: Branch a -> Stop
 stopping = Stop . branchId
 
--- | Marks those as asked that have not ended, and have not been asked before; and gives
--- them, the last first.
-marked :: [SomeBranch] -> IO [SomeBranch]
-marked = foldM mark []
- where
-  mark others new@(SomeBranch b) = do
-    over <- isJust <$> threadEndNow (branchThread b)
-    asked <- readIORef (branchAsked b)
-    if over || asked then pure others else (new : others) <$ writeIORef (branchAsked b) True
+-- | Marks a branch as asked. False if it was asked before, or has ended.
+marked :: Branch a -> IO Bool
+marked b = do
+  over <- isJust <$> threadEndNow (branchThread b)
+  asked <- readIORef (branchAsked b)
+  let needed = not (over || asked)
+  when needed $ writeIORef (branchAsked b) True
+  pure needed
 
 -- | Waits for the end of the branch.
 ended :: Branch a -> IO (Outcome a)
