@@ -117,10 +117,10 @@ readings name n alongside = do
   alongside (map (readSensor . advancePtr counts) [0 .. n - 1]) $ do
     -- Until the start is over, and what it left is out of the way.
     sleep 1
-    performMajorGC
+    replicateM_ 2 performMajorGC
     sleep 1
     (t0, cpu0, made0) <- (,,) <$> time <*> processorTime <*> made
-    sleep 3
+    sleep 6
     (t1, cpu1, made1) <- (,,) <$> time <*> processorTime <*> made
     let readings' = fromIntegral (made1 - made0)
         due = fromIntegral n * (t1 - t0) / 1e8

@@ -9,7 +9,7 @@ module Behavior.Internal.Sensor
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (evaluate, throwIO)
-import Control.Monad (forever, void, when)
+import Control.Monad (forever, when)
 import Data.IORef (newIORef, readIORef, writeIORef)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
@@ -48,53 +48,49 @@ polling every act = Signal $ do
   _ <- period "polling" every
   views <- newTVarIO (0 :: Int) -- how many were asked for
   newest <- newTVarIO Nothing -- the reading last told, and how many views there were when it began
-  begun <- newIORef Nothing -- the slot of the last reading that has begun
+  begun <- newIORef (-1 / 0) -- the slot of the last reading that has begun
   underWay <- newTVarIO Nothing -- the slot of the reading that is under way
   telling <- newIORef False -- whether somebody wants to know of that
   same <- newIORef (\_ _ -> False)
-  let readFrom once t planned told asked = do
-        slot <- sleepToSlot every t planned
-        writeIORef begun (Just slot)
+  let -- Makes a first reading, and gives those that follow.
+      readFirst asked = do
         tells <- readIORef telling
-        when tells $ atomically (writeTVar underWay (Just slot))
-        asking <- readTVarIO views
-        read' <- trySynchronous act
-        stopping <- asked
-        if stopping
-          then -- The reading is not wanted any more, and may have swallowed the
-          -- request to stop. A fault of its cleanup is not lost.
-            either throwIO (const (pure (const (pure ())))) read'
-          else do
-            isNews <- case (told, read') of
-              -- (Who asked for a view meanwhile wants to hear it, whatever it is.)
-              (Told asking' old, Right new) | asking == asking' -> differs old new
-              _ -> pure True
-            when (isNews || tells) . atomically $ do
-              when isNews (writeTVar newest (Just (asking, read')))
-              when tells (writeTVar underWay Nothing)
-            let told'
-                  | isNews = either (const Untold) (Told asking) read'
-                  | otherwise = told
-                onwards asked' = do
-                  t' <- now
-                  readFrom False t' (slotAfter (slot + every) t') told' asked'
-            if once then pure (void . onwards) else onwards asked
-      differs old new = do
         isSame <- readIORef same
-        either (const True) not <$> trySynchronous (evaluate (isSame old new))
+        let -- Those of the slots after the given one.
+            readOn slot told asked' = do
+              t <- now
+              next <- sleepToSlot every t (slotAfter (slot + every) t)
+              readAt next told asked' >>= maybe (pure ()) (\told' -> readOn next told' asked')
+            -- Gives what is told of the sensor now, if somebody still wants it.
+            readAt slot told asked' = do
+              writeIORef begun slot
+              when tells $ atomically (writeTVar underWay (Just slot))
+              asking <- readTVarIO views
+              read' <- trySynchronous act
+              stopping <- asked'
+              if stopping
+                then -- The reading is not wanted any more, and may have swallowed the
+                -- request to stop. A fault of its cleanup is not lost.
+                  either throwIO (const (pure Nothing)) read'
+                else do
+                  isNews <- case (told, read') of
+                    -- (Who asked for a view meanwhile wants to hear it, whatever it is.)
+                    (Told asking' old, Right new) | asking == asking' -> differs old new
+                    _ -> pure True
+                  when (isNews || tells) . atomically $ do
+                    when isNews (writeTVar newest (Just (asking, read')))
+                    when tells (writeTVar underWay Nothing)
+                  pure $! Just $! if isNews then either (const Untold) (Told asking) read' else told
+            differs old new = either (const True) not <$> trySynchronous (evaluate (isSame old new))
+        t <- now
+        slot <- sleepToSlot every t . max t . (+ every) =<< readIORef begun
+        maybe (\_ -> pure ()) (readOn slot) <$> readAt slot Untold asked
       slotAfter next t
         | next >= t = next
         | otherwise = next + every * fromInteger (ceiling ((t - next) / every))
   pure
     Source
-      { workers =
-          [ Reader "polling" $ do
-              writeTVar underWay Nothing
-              pure $ \asked -> do
-                t <- now
-                slot <- maybe t (max t . (+ every)) <$> readIORef begun
-                readFrom True t slot Untold asked
-          ]
+      { workers = [Reader "polling" (readFirst <$ writeTVar underWay Nothing)]
       , view = do
           n <- (+ 1) <$> readTVar views
           writeTVar views n
