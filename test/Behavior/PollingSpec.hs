@@ -14,9 +14,10 @@ import Data.Foldable (for_)
 import Data.List (group)
 import Test.Hspec hiding (after, before)
 
-import Behavior (Behavior, Seconds)
+import Behavior (Behavior, Seconds, sleep)
 import Behavior.Internal.Runtime (Event (..), Label (..), atomically, now, reportingTo)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (simulate)
 import Support
 import Watched
 
@@ -71,6 +72,15 @@ slots = do
     all' <- notes times
     apart 0.001 all'
     noMoreThan 0.001 (snd (all' !! 2)) (drop 3 all')
+
+  it "after a slow reading the next one begins in a slot, and not in between" $ do
+    moments <- newNotebook
+    _ <- simulate . Signal.waitUntil . Signal.polling 2 $ do
+      now >>= note moments
+      n <- length <$> notes moments
+      when (n == 2) (sleep 5)
+      pure (n == 4)
+    notes moments `shouldReturn` [0, 2, 8, 10]
 
   it "readings start a period apart also when a branch is switched each time" $ do
     times <- newNotebook

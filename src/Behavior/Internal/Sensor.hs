@@ -48,7 +48,7 @@ polling every act = Signal $ do
   _ <- period "polling" every
   views <- newTVarIO (0 :: Int) -- how many were asked for
   newest <- newTVarIO Nothing -- the reading last told, and how many views there were when it began
-  begun <- newIORef (-1 / 0) -- the slot of the last reading that has begun
+  next <- newIORef (-1 / 0) -- when the next reading may begin
   underWay <- newTVarIO Nothing -- the slot of the reading that is under way
   telling <- newIORef False -- whether somebody wants to know of that
   same <- newIORef (\_ _ -> False)
@@ -56,14 +56,13 @@ polling every act = Signal $ do
       readFirst asked = do
         tells <- readIORef telling
         isSame <- readIORef same
-        let -- Those of the slots after the given one.
-            readOn slot told asked' = do
+        let readOn told asked' = do
               t <- now
-              next <- sleepToSlot every t (slotAfter (slot + every) t)
-              readAt next told asked' >>= maybe (pure ()) (\told' -> readOn next told' asked')
+              slot <- sleepToSlot every t . notBefore t =<< readIORef next
+              readAt slot told asked' >>= maybe (pure ()) (`readOn` asked')
             -- Gives what is told of the sensor now, if somebody still wants it.
             readAt slot told asked' = do
-              writeIORef begun slot
+              writeIORef next $! slot + every
               when tells $ atomically (writeTVar underWay (Just slot))
               asking <- readTVarIO views
               read' <- trySynchronous act
@@ -83,11 +82,11 @@ polling every act = Signal $ do
                   pure $! Just $! if isNews then either (const Untold) (Told asking) read' else told
             differs old new = either (const True) not <$> trySynchronous (evaluate (isSame old new))
         t <- now
-        slot <- sleepToSlot every t . max t . (+ every) =<< readIORef begun
-        maybe (\_ -> pure ()) (readOn slot) <$> readAt slot Untold asked
-      slotAfter next t
-        | next >= t = next
-        | otherwise = next + every * fromInteger (ceiling ((t - next) / every))
+        slot <- sleepToSlot every t . max t =<< readIORef next
+        maybe (\_ -> pure ()) readOn <$> readAt slot Untold asked
+      notBefore t slot
+        | slot >= t = slot
+        | otherwise = slot + every * fromInteger (ceiling ((t - slot) / every))
   pure
     Source
       { workers = [Reader "polling" (readFirst <$ writeTVar underWay Nothing)]
