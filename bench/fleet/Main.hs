@@ -115,7 +115,8 @@ readings name n alongside = do
   let readSensor count = (peek count >>= poke count . (+ 1)) >> readIORef level
       made = sum <$> peekArray n counts :: IO Int
   alongside (map (readSensor . advancePtr counts) [0 .. n - 1]) $ do
-    -- Until the start is over, and what it left is out of the way.
+    -- Until the start is over, what it left is out of the way, and what lives is taken for
+    -- old: that is so after two collections.
     sleep 1
     replicateM_ 2 performMajorGC
     sleep 1

@@ -123,7 +123,7 @@ fleetBytes =
     ]
 fleetTime =
   fleet
-    "A fleet: nanoseconds an agent, or a reading (after a collection)"
+    "A fleet: nanoseconds an agent, or a reading (after two collections)"
     [ "fleet creation 100000" `within` 1 `times` "bonsai fleet creation 100000"
     , told "bare fleet creation 100000"
     , "fleet polled reading 10000" `within` 1 `times` "bonsai fleet tick 10000"
