@@ -53,35 +53,31 @@ heard report =
   said = map (fmap (meaning . drop 1) . break (== '\t')) report
   meaning text = maybe (Left text) Right (readMaybe text)
 
--- | What its rounds come to, or why there are none.
-valueOf :: Heard -> Figure -> Either String Double
-valueOf (Heard rounds absences) figure = case Map.lookup (named figure) rounds of
-  Just numbers -> Right (fold figure * comesTo figure numbers)
+-- | Its rounds, or why there are none.
+roundsOf :: Heard -> Figure -> Either String (Figure, [Double])
+roundsOf (Heard rounds absences) figure = case Map.lookup (named figure) rounds of
+  Just numbers -> Right (figure, numbers)
   Nothing -> Left (maybe "absent: not measured" snd (find ((`isPrefixOf` named figure) . fst) absences))
 
+valueOf :: Heard -> Figure -> Either String Double
+valueOf measured figure = uncurry comesTo <$> roundsOf measured figure
+
 ratioOf :: Heard -> Figure -> Figure -> Either String Double
-ratioOf measured mine theirs = over <$> valueOf measured mine <*> valueOf measured theirs
- where
-  a `over` b = if a == b then 1 else a / b
+ratioOf measured mine theirs = over <$> roundsOf measured mine <*> roundsOf measured theirs
 
 -- The table.
 
 cells :: Heard -> Row -> [String]
 cells measured (Row mine promise) =
   [label mine, shown value] ++ case promise of
-    Times bound theirs ->
-      let ratio = ratioOf measured mine theirs
-       in [ label theirs
-          , shown (valueOf measured theirs)
-          , shown ratio
-          , "<= " ++ significant bound
-          , verdict (<= bound) ratio
-          ]
+    Times bound theirs -> than theirs ++ ["<= " ++ significant bound, verdict (<= bound) (ratioOf measured mine theirs)]
+    Beside theirs -> than theirs ++ ["", fromLeft "" (ratioOf measured mine theirs)]
     AtMost bound -> ["", "", "", "<= " ++ significant bound, verdict (<= bound) value]
     AtLeast bound -> ["", "", "", ">= " ++ significant bound, verdict (>= bound) value]
     NoPromise -> ["", "", "", "", fromLeft "" value]
  where
   value = valueOf measured mine
+  than theirs = [label theirs, shown (valueOf measured theirs), shown (ratioOf measured mine theirs)]
   shown = either (const "-") significant
   verdict meets = either id (\number -> if meets number then "met" else "NOT MET")
 

@@ -47,7 +47,8 @@ manyBranches =
         , n <- [10, 100, 1000]
         ]
       , [operator `of'` 100 `atMost` 60 * microseconds | operator <- ["firstOf", "allOf"]]
-      , [told (primitive `of'` n) | primitive <- ["bare threads, stopped", "asum of Concurrently", "mapConcurrently_"], n <- [10, 100, 1000]]
+      , ["bare threads, stopped" `of'` n `beside` scaled (n / 2) ("bare threads, stopped" `of'` 2) | n <- [10, 100, 1000]]
+      , [told (primitive `of'` n) | primitive <- ["asum of Concurrently", "mapConcurrently_"], n <- [10, 100, 1000]]
       ]
 rules =
   operators "Ordered rules, a change: nanoseconds" $
