@@ -74,8 +74,8 @@ data Source a = Source
   -- ^ Asks to be told when the oldest reading began that is under way; before any worker
   -- is started.
   , alike :: (a -> a -> Bool) -> IO ()
-  -- ^ Says which values are alike to all who look: then nobody need hear of a reading
-  -- that is like the last one.
+  -- ^ Says which values are alike to all who look, before any worker is started: then nobody
+  -- need hear of a reading that is like the last one.
   }
 
 -- | The source that gives this view, and all by itself.
