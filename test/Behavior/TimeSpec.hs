@@ -147,8 +147,7 @@ timeouts = do
 
   it "counts from when it is run, each time" $ do
     let limited = timeout 0.001
-    limited hang `shouldThrow` (== TimedOut 0.001)
-    limited (pure 'a') `shouldReturn` 'a'
+    virtually ((limited hang ? pure ()) >> limited (pure 'a')) `shouldReturn` 'a'
 
   it "sees what is written in the transactions that it waits for" $ do
     var <- newTVarIO 'a'
