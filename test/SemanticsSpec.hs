@@ -89,7 +89,7 @@ subtle =
       , caller = Stranger 9
       }
   , -- It was high, unnoticed by the operator.
-    (alone (RSelect (And (Hysteresis 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
+    (alone (RSelect (And (Hysteresis False 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
       { changes = [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "q" (At 1)]
       }
   , -- A change has lasted just as it is taken back.
@@ -289,7 +289,7 @@ relation = do
     it "remember that they were high" $
       with
         [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "p" (At 0)]
-        (WithShared (Hysteresis 0 2 (Watched "p")) (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7))))
+        (WithShared (Hysteresis False 0 2 (Watched "p")) (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7))))
         `endsWith` [Gave 3 (Failed doesNotHold)]
     it "do not follow a flicker" $
       with [Change 1 "p" (At 1), Change 2 "p" (At 0), Change 3 "p" (At 1)] (WaitUntil (Debounce 2 (Watched "p")))

@@ -71,7 +71,7 @@ opened t p = case p of
   WithShared signal body -> Sharing (open t signal) (thread t "withShared: body" body)
   TeleoReactive rules -> following (startedAt t (Joined FirstHolding (map (made . fst) rules)))
   _ -> case signals p of
-    signal : _ -> following (readingOnce (open t signal))
+    signal : _ -> following (open t signal)
     [] -> error "opened: this operator has no signal"
  where
   following source = Reacting p source (viewOf t source) (Choosing First)

@@ -96,7 +96,10 @@ within' inScope sharing = go
       , (1, Debounce <$> choose (0, 3) <*> sensor n)
       , (1, StaleAfter <$> choose (1, 3) <*> sensor n)
       ]
-  hysteresis = elements [Hysteresis low high | (low, high) <- [(0, 2), (0, 2), (0, 1), (1, 1), (1, 2)]]
+  hysteresis = do
+    initially <- arbitrary
+    (low, high) <- elements [(0, 2), (0, 2), (0, 1), (1, 1), (1, 2)]
+    pure (Hysteresis initially low high)
   sensor n =
     frequency $
       [ (8, Watched <$> elements known)

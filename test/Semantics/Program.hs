@@ -90,7 +90,7 @@ data Signal
   | -- | One where both hold, otherwise zero.
     And Signal Signal
   | -- | One where it is high, otherwise zero. The lower threshold comes first.
-    Hysteresis Int Int Signal
+    Hysteresis Bool Int Int Signal
   | Debounce Ticks Signal
   | StaleAfter Ticks Signal
   | -- | The signal of the nearest 'WithShared' around it.

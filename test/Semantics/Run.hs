@@ -177,7 +177,7 @@ play tell stage = go
     Watched condition -> watching (reading condition)
     Polled every p -> number <$> polling (fromIntegral every) (go p)
     And a b -> (\m n -> fromEnum (holds m && holds n)) <$> level a <*> level b
-    Hysteresis low high signal -> fromEnum <$> hysteresis low high (level signal)
+    Hysteresis initially low high signal -> fromEnum <$> hysteresis initially low high (level signal)
     Debounce n signal -> debounce (fromIntegral n) (level signal)
     StaleAfter n signal -> staleAfter (fromIntegral n) (level signal)
     Shared -> nearest stage
