@@ -170,7 +170,8 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         _ -> True
   begin FirstRead
  where
-  observe act = trySynchronous (atomically act)
+  observe :: STM b -> IO (Either SomeException b)
+  observe act = atomically ((Right <$> act) `catchSTM` (pure . Left))
   rested = traverse_ (atomically . outcomeOf)
 
 timeoutWith :: Maybe Flaw -> Seconds -> Behavior a -> Behavior a

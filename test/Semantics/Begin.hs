@@ -30,7 +30,7 @@ initial world =
             [ thread start "firstOf: 1" (program world)
             , Thread "firstOf: 2" (Living Unasked (Changing (changes world) (patience world)))
             ]
-        Stranger later ->
+        Stranger _ later ->
           Called Unasked (Starting (program world)) (changes world) [patience world, patience world + later]
     }
  where

@@ -37,7 +37,7 @@ smallWorlds = do
   someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure Lost)]
 
 callers :: Gen Caller
-callers = frequency [(3, pure Operator), (1, Stranger <$> choose (0, 3))]
+callers = frequency [(3, pure Operator), (1, Stranger <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))]
 
 inOrder :: [Change] -> [Change]
 inOrder = sortOn (\(Change at _ _) -> at)

@@ -26,6 +26,7 @@ import Data.Foldable (for_)
 import Data.IORef
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
+import Data.Maybe (isJust)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
@@ -126,9 +127,11 @@ behavior tell world = do
   let played = play tell stage (program world)
   case caller world of
     Operator -> firstOf [played, timeIsUp <$ environment stage]
-    Stranger later -> do
+    Stranger type' later -> do
       thread <- mask_ (start (Sim.Label "stranger" "") played)
-      let interrupting = interruptByMessengers (const Enough) [threadId thread]
+      let interrupting = case type' of
+            Asynchronous -> interruptByMessengers (const Enough) [threadId thread]
+            Synchronous -> interruptByMessengers (const EnoughOfThis) [threadId thread]
       environment stage
       interrupting
       sleepUntil (fromIntegral (patience world + later))
@@ -199,7 +202,7 @@ act tell name script = do
     try (inState restore (wait (takes script))) >>= \case
       Right () -> finish name (ends script)
       Left e
-        | not (isCancellation e) -> throwIO e
+        | not (isStopRequest e) -> throwIO e
         | otherwise -> do
             tell Hears
             case whenAsked script of
@@ -227,7 +230,7 @@ act tell name script = do
 thrown :: SomeException -> Result
 thrown e
   | Just (StoppedWithFault _ fault) <- fromException e = Stopped (Just (show fault))
-  | isCancellation e = Stopped Nothing
+  | isStopRequest e = Stopped Nothing
   | isFailure e = Failed (show e)
   | otherwise = Faulted (show e)
 
@@ -240,9 +243,18 @@ instance Exception Failure where
   toException = behaviorFailedToException
   fromException = behaviorFailedFromException
 
--- | What a stranger throws.
+-- | Whether it stops what runs; what a stranger throws does, whatever its type.
+isStopRequest :: SomeException -> Bool
+isStopRequest e = isCancellation e || isJust (fromException e :: Maybe EnoughOfThis)
+
+-- | What a stranger throws, of an asynchronous type and of a synchronous one.
 data Enough = Enough
   deriving (Show)
+
+data EnoughOfThis = EnoughOfThis
+  deriving (Show)
+
+instance Exception EnoughOfThis
 
 instance Exception Enough where
   toException = asyncExceptionToException
