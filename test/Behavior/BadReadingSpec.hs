@@ -224,7 +224,7 @@ stale = do
       book <- newNotebook
       let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note book "reading"))
       ending (Signal.rSelect signal (note book "left") (note book "right"))
-        `shouldReturn` FaultedWith ("staleAfter: a period is more than zero seconds, not " ++ shown)
+        `shouldReturn` FaultedWith ("staleAfter: a period is at least 0.000001 seconds, not " ++ shown)
       notes book `shouldReturn` []
  where
   tooLong limit = "FailedBecause " ++ show ("no reading of the signal within " ++ limit ++ " s")
