@@ -1,15 +1,19 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- |
 -- Readings of a polled sensor that go wrong: that fail, hang, cannot be interrupted, or
 -- make trouble when they are; and 'Signal.staleAfter'.
 module Behavior.BadReadingSpec (spec) where
 
 import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM (catchSTM)
 import Control.Exception
 import Control.Monad (void, when)
 import Data.Foldable (for_)
 import Data.Maybe (isJust)
 import Test.Hspec
 
+import Behavior (Failed)
 import Behavior.Internal.Runtime (atomically, now)
 import Behavior.Internal.Scope (SomeBranch (..), ask, outcome, structured)
 import Behavior.Internal.Source (startSensors)
@@ -208,6 +212,22 @@ stale = do
       for_ workers (atomically . outcome)
       _ <- startSensors scope "test" source
       atomically reading >>= (`shouldSatisfy` (/= began))
+      pure (pure ())
+
+  it "does not forgive a reading that was overdue when it has ended" $ do
+    entered <- newGate
+    mayEnd <- newGate
+    level <- newSensor $ \n -> when (n == 1) (open entered >> pass mayEnd)
+    source <- Source.open (Signal.staleAfter 0.001 (sensing level)) Source.anything
+    structured $ \scope -> do
+      (seen, _) <- startSensors scope "test" source
+      let isStale view = atomically ((False <$ Source.firstRead view) `catchSTM` \(_ :: Failed) -> pure True)
+      pass entered
+      isStale seen `shouldReturn` True
+      open mayEnd
+      -- A view that is asked for later finds the reading that ended in time.
+      eventually $ not <$> (atomically (Source.view source) >>= isStale)
+      isStale seen `shouldReturn` True
       pure (pure ())
 
   it "never fails a signal that is not polled" $ do
