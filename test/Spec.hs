@@ -34,11 +34,14 @@ import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
 import qualified Promises.PromisesSimSpec
 import qualified SemanticsSpec
+import qualified Sim.DeliverySpec
+import qualified Sim.EndSpec
 import qualified Sim.ExploreSpec
 import qualified Sim.MockSpec
 import qualified Sim.QuickCheckSpec
 import qualified Sim.RecordSpec
 import qualified Sim.SimulateSpec
+import qualified Sim.SlipSpec
 
 main :: IO ()
 main = hspec $ do
@@ -72,6 +75,9 @@ main = hspec $ do
     Behavior.ReactiveSpaceSpec.spec
   describe "Simulation" $ do
     Sim.SimulateSpec.spec
+    Sim.DeliverySpec.spec
+    Sim.EndSpec.spec
+    Sim.SlipSpec.spec
     Sim.ExploreSpec.spec
     Sim.RecordSpec.spec
     Sim.MockSpec.spec

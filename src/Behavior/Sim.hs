@@ -46,8 +46,10 @@
 -- 'Behavior.Time.checkpoint', and the end of a thread) another may run. The virtual time moves
 -- on when no thread can.
 --
--- A cancellation arrives at these operations, by GHC's rule: masked, only where
--- the operation has to wait.
+-- A cancellation arrives where GHC raises it: unmasked at these operations and before the
+-- end of a thread; masked only where the operation has to wait, or else at the very moment
+-- when the thread unmasks, also if no operation follows. ('Control.Exception.throwTo' is not
+-- simulated, but what this library's operators throw is.)
 --
 -- = What is not simulated
 --
@@ -61,6 +63,7 @@
 --   instead. (If it waits for less than half a second, that goes
 --   unnoticed. So does 'System.Timeout.timeout' around something that is simulated: it counts
 --   real time.) To print is fine, as long as somebody reads.
+-- * Computing takes no time, and timers are exact, unless 'slip' says otherwise.
 -- * Clocks, random numbers and finalizers of your own are as they are.
 --
 -- A loop that never allocates can be stopped by nobody. The process is killed after
@@ -95,6 +98,7 @@ module Behavior.Sim
   , randomly
   , exhaustively
   , replaying
+  , endingAt
   , Report (..)
   , Counterexample (..)
   ) where

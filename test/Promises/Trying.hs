@@ -93,7 +93,7 @@ simulated simulating =
           Returned () -> readIORef end >>= maybe (broken "it did not end") (pure . endingOf)
           none -> broken (explain none)
     , tick = 1
-    , -- It never arrives: who does nothing more hears nothing.
+    , -- It is pending until the thread ends (and is raised only in one that unmasks before).
       untilOver = \thread -> interrupt thread (Cancel "nobody")
     }
 

@@ -28,7 +28,7 @@ initial world =
           Looking
             Race
             [ thread start "firstOf: 1" (program world)
-            , Thread "firstOf: 2" (Living Unasked (Changing (changes world) (patience world)))
+            , Thread "firstOf: 2" (Living Unborn (Changing (changes world) (patience world)))
             ]
         Stranger _ later ->
           Called Unasked (Starting (program world)) (changes world) [patience world, patience world + later]
@@ -92,7 +92,7 @@ ended name = \case
 
 -- | A thread, which may be asked to stop before it does anything at all, even end.
 thread :: Now -> Label -> Program -> Thread
-thread t label p = Thread label (Living Unasked starting)
+thread t label p = Thread label (Living Unborn starting)
  where
   starting = if canWait begun then begun else Starting p
   begun = begin t p

@@ -19,10 +19,18 @@ import Semantics.Program
 
 -- | An operator asks a thread to stop once at most, but others may ask it again.
 data Request
-  = Unasked
+  = -- | Perhaps it has not even been started.
+    Unborn
+  | Unasked
   | Asked
   | -- | It has heard neither.
     AskedTwice
+  | -- | Time has passed since, and it could not hear: it will as soon as it can, before it
+    -- does anything else.
+    Pending
+  | PendingTwice
+  | -- | One is due, and another has come.
+    PendingAndAsked
   | Heard
   deriving (Eq, Ord, Show)
 

@@ -19,7 +19,7 @@ import Semantics.Program
 worlds :: Int -> Gen World
 worlds deep = do
   levels' <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure Lost)]) known
-  World levels' <$> someChanges <*> choose (4, 16) <*> (renamed <$> programs deep) <*> callers
+  World levels' <$> someChanges <*> choose (4, 16) <*> (renamed <$> programs deep) <*> callers <*> pure 0
  where
   someChanges = do
     n <- choose (0, 8)
@@ -32,7 +32,7 @@ smallWorlds = do
   first <- At <$> choose (0, 1)
   n <- choose (0, 2)
   changes' <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
-  World [("p", first), ("q", At 0)] changes' <$> choose (2, 4) <*> (renamed <$> programs 1) <*> callers
+  World [("p", first), ("q", At 0)] changes' <$> choose (2, 4) <*> (renamed <$> programs 1) <*> callers <*> pure 0
  where
   someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure Lost)]
 

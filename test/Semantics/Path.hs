@@ -39,8 +39,8 @@ data End
   = Gave Ticks Result
   | -- | Nothing can happen any more, and time does not help.
     Deadlock
-  | -- | Nobody waited for the end.
-    Unknown
+  | -- | It was cut off then.
+    Unknown Ticks
   deriving (Eq, Ord, Show)
 
 data Verdict
@@ -60,11 +60,11 @@ explains :: Int -> (Event -> Bool) -> World -> Seen -> Verdict
 explains fuel visible world seen = go (Set.singleton (initial world)) (filter (visible . snd) (timeline seen))
  where
   go states = \case
-    [] -> case (end seen, silently fuel visible (upTo (end seen)) states) of
-      (Unknown, _) -> Possible
-      (_, Nothing) -> OutOfFuel
-      (_, Just these)
+    [] -> case silently fuel slip visible (upTo (end seen)) states of
+      Nothing -> OutOfFuel
+      Just these
         | end seen `elem` ends' -> Possible
+        | Unknown t <- end seen, any (goesOnAt t) these -> Possible
         | otherwise -> ImpossibleEnd ends'
        where
         ends' = mapMaybe endOf (Set.toList these)
@@ -74,18 +74,21 @@ explains fuel visible world seen = go (Set.singleton (initial world)) (filter (v
         [] -> Impossible rest [(clock (now s), e) | s <- Set.toList these, (e, _) <- step s, visible e]
         next -> go (Set.fromList next) later
    where
-    still t = silently fuel visible (Just t) states
+    still t = silently fuel slip visible (Just t) states
+  slip = slippage world
   upTo = \case
     Gave t _ -> Just t
-    _ -> Nothing
+    Unknown t -> Just t
+    Deadlock -> Nothing
   at t = filter ((== t) . clock . now) . Set.toList
 
 -- | Every timeline that the relation allows, with its end. Nothing: more than fuel.
 paths :: Int -> (Event -> Bool) -> World -> Maybe (Set Seen)
 paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world))
  where
+  slip = slippage world
   go past states = do
-    these <- silently fuel visible Nothing states
+    these <- silently fuel slip visible Nothing states
     let ends' = Set.fromList (mapMaybe endOf (Set.toList these))
         next =
           Map.fromListWith Set.union $
@@ -99,8 +102,8 @@ paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world)
       (Map.toList next)
 
 -- | All states that are reached without anything to see, up to a moment.
-silently :: Int -> (Event -> Bool) -> Maybe Ticks -> Set State -> Maybe (Set State)
-silently fuel visible limit states = go states (Set.toList states)
+silently :: Int -> Ticks -> (Event -> Bool) -> Maybe Ticks -> Set State -> Maybe (Set State)
+silently fuel slip visible limit states = go states (Set.toList states)
  where
   go known = \case
     [] -> Just known
@@ -110,15 +113,22 @@ silently fuel visible limit states = go states (Set.toList states)
           let new = filter (`Set.notMember` known) (quietly s)
            in go (foldr Set.insert known new) (new ++ others)
   quietly s = case step s of
-    [] | Just later <- pass s, maybe True (clock (now later) <=) limit -> [later]
+    [] -> [later | later <- pass slip s, maybe True (clock (now later) <=) limit]
     next -> [s' | (e, s') <- next, not (visible e)]
 
 -- | How the run ended, if it has.
 endOf :: State -> Maybe End
 endOf s = case running s of
   Over r -> Just (Gave (clock (now s)) r)
-  _ | null (step s), Nothing <- pass s -> Just Deadlock
+  _ | null (step s), null (pass 0 s) -> Just Deadlock
   _ -> Nothing
+
+-- | Whether it has not ended, and nothing is left to be done at this moment. (What is in a
+-- deadlock does not end either.)
+goesOnAt :: Ticks -> State -> Bool
+goesOnAt t s = case running s of
+  Over _ -> False
+  _ -> null (step s) && all ((> t) . clock . now) (pass 0 s)
 
 -- | Whether an event can be seen.
 everything, whatIsDone :: Event -> Bool

@@ -159,6 +159,8 @@ data World = World
   , patience :: Ticks
   , program :: Program
   , caller :: Caller
+  , slippage :: Ticks
+  -- ^ By less than so much a timer may be late.
   }
   deriving (Eq, Ord, Show)
 

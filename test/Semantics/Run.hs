@@ -43,7 +43,7 @@ import Behavior.Internal.Time
 import Behavior.Sim
   ( Did (Says)
   , Label (..)
-  , Options (endAt, scheduled, standstill)
+  , Options (endAt, scheduled, slip, standstill)
   , Plan (..)
   , Report (complete)
   , Run (finished, outcome)
@@ -61,7 +61,7 @@ import Semantics.Program hiding (Label)
 -- | Simulates the world's program under a schedule, and gives what could be seen; or
 -- says why there was no end to see.
 observed :: Schedule -> World -> IO (Either String Seen)
-observed how = observing (simulateWith limits {scheduled = how})
+observed how world = observing (simulateWith (limits world) {scheduled = how}) world
 
 -- | Simulates the world's program under all schedules with up to so many pre-emptions,
 -- but under no more schedules than the second number, and gives all that could be seen
@@ -69,14 +69,14 @@ observed how = observing (simulateWith limits {scheduled = how})
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
-  report <- explore (Plan (Exhaustive preemptions most) limits) $ \simulated ->
+  report <- explore (Plan (Exhaustive preemptions most) (limits world)) $ \simulated ->
     observing simulated world >>= \seen -> modifyIORef' found (Set.insert seen)
   found' <- readIORef found
   pure (found', complete report)
 
 -- | A run without an end is cut short.
-limits :: Options
-limits = defaults {standstill = 20000, endAt = 60}
+limits :: World -> Options
+limits world = defaults {standstill = 20000, endAt = 60, slip = fromIntegral (slippage world)}
 
 observing :: (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Seen)
 observing simulated world = do
@@ -93,12 +93,12 @@ observing simulated world = do
     Sim.Failing e -> gave (thrown e)
     Sim.Faulting e -> gave (thrown e)
     Sim.Cancelled e -> gave (thrown e)
-    Sim.Deadlock _ -> seen Deadlock
-    Sim.OutOfTime -> seen Unknown
+    Sim.OutOfTime -> seen (Unknown (ticks (finished run)))
+    Sim.Deadlock _ -> Left "a deadlock, though there is an end to wait for"
     Sim.Livelock labels -> Left ("livelock: " ++ show labels)
     Sim.Outside who _ -> Left ("outside: " ++ show who)
     Sim.Meddled waiting -> Left ("meddled: " ++ show waiting)
-    Sim.TooSlow who -> Left ("too slow: " ++ show who)
+    Sim.TooSlow who _ -> Left ("too slow: " ++ show who)
     Sim.Misfit why -> Left ("misfit: " ++ why)
  where
   ticks = round

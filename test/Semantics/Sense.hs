@@ -41,7 +41,7 @@ oneOf one = \case
 -- takes its steps, and how it hears a request to stop.)
 sourceSteps
   :: (Now -> Running -> Steps Running)
-  -> (Now -> Running -> Maybe (Event, Running))
+  -> (Now -> Running -> [(Event, Running)])
   -> Now
   -> Source
   -> Steps Source
@@ -58,7 +58,7 @@ sourceSteps steps hear = go
 
 pollerSteps
   :: (Now -> Running -> Steps Running)
-  -> (Now -> Running -> Maybe (Event, Running))
+  -> (Now -> Running -> [(Event, Running)])
   -> Now
   -> Poller
   -> Steps Poller
@@ -75,7 +75,7 @@ pollerSteps steps hear t s =
         silently t s {newest = Just (readings s, result), underWay = Nothing, poll = Sleeping (nextSlot (slot s))}
       Leaving result -> silently t s {poll = Rested (asOutcome result)}
       _ -> []
-      ++ [(Happens event, t, s') | asked s == Asked, Just (event, s') <- [hears]]
+      ++ [(Happens event, t, s') | asked s == Asked, (event, s') <- hears]
  where
   read' p = \case
     Over result
@@ -85,9 +85,9 @@ pollerSteps steps hear t s =
     r -> p {poll = Reading r}
   hears = case poll s of
     Reading r -> fmap (read' heard) <$> hear t r
-    Leaving _ -> Nothing
-    Rested _ -> Nothing
-    _ -> Just (Silent, heard {poll = Rested (Stopped Nothing)})
+    Leaving _ -> []
+    Rested _ -> []
+    _ -> [(Silent, heard {poll = Rested (Stopped Nothing)})]
   heard = s {asked = Heard}
   -- Slots that were missed are skipped.
   nextSlot due

@@ -18,6 +18,7 @@ shrinkWorld world =
   [world {program = p} | p <- shrinkProgram (program world), not (strays p)]
     ++ [world {changes = some} | some <- shrinkList shrinkChange (changes world)]
     ++ [world {caller = Operator} | caller world /= Operator]
+    ++ [world {slippage = n} | n <- shrink (slippage world)]
     ++ [world {patience = n} | n <- shrink (patience world), n > 0]
  where
   shrinkChange (Change at condition level) =

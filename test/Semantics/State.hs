@@ -31,6 +31,7 @@ module Semantics.State
 
     -- * Time
   , moments
+  , afterwards
   ) where
 
 import Data.Map.Strict (Map)
@@ -96,6 +97,8 @@ data Running
     Changing [Change] Ticks
   | -- | The program of a stranger, who asks it to stop at those times.
     Called Request Running [Change] [Ticks]
+  | -- | It has done all that it does, and can still be stopped.
+    Returning Result
   | Over Result
   deriving (Eq, Ord, Show)
 
@@ -193,7 +196,7 @@ data Poll
 -- | To ask one that was asked before, or has ended, changes nothing.
 ask :: Thread -> Thread
 ask = \case
-  Thread label (Living Unasked r) -> Thread label (Living Asked r)
+  Thread label (Living asks r) | asks `elem` [Unborn, Unasked] -> Thread label (Living Asked r)
   other -> other
 
 -- | Whoever asked for the stop takes out the fault that was met on the way.
@@ -256,3 +259,40 @@ moments = \case
     Settling d source -> [since + delay d | Just (_, since) <- [timing d]] ++ ofSource source
     Guarding w source -> [since + limit w | Due since <- [guarding w]] ++ ofSource source
     _ -> []
+
+-- | What time does to all that runs: by now all has been started, and every request has come
+-- to where it is to be heard.
+afterwards :: Running -> Running
+afterwards = \case
+  first `AndThen` second -> afterwards first `AndThen` second
+  first `OrElse` second -> afterwards first `OrElse` second
+  Obtaining k r -> Obtaining k (afterwards r)
+  Answering k r -> Answering k (afterwards r)
+  Looking operator threads -> Looking operator (map ofThread threads)
+  Reacting p source v phase -> Reacting p (ofSource source) v (ofPhase phase)
+  Sharing source body -> Sharing (ofSource source) (ofThread body)
+  Concluding operator result source threads -> Concluding operator result (ofSource source) (map ofThread threads)
+  Called asks r coming asking -> Called (ofRequest asks) (afterwards r) coming asking
+  r -> r
+ where
+  ofThread = \case
+    Thread label (Living asks r) -> Thread label (Living (ofRequest asks) (afterwards r))
+    other -> other
+  ofPhase = \case
+    Following value branch -> Following value (ofThread branch)
+    Switching next branch -> Switching next (ofThread branch)
+    Recovering before recovery -> Recovering (ofThread <$> before) (ofThread recovery)
+    phase -> phase
+  ofSource = \case
+    Polling s@Poller {poll = Reading r} -> Polling s {poll = Reading (afterwards r)}
+    Joined how sources -> Joined how (map ofSource sources)
+    Remembering m source -> Remembering m (ofSource source)
+    Settling d source -> Settling d (ofSource source)
+    Guarding w source -> Guarding w (ofSource source)
+    source -> source
+  ofRequest = \case
+    Unborn -> Unasked
+    Asked -> Pending
+    AskedTwice -> PendingTwice
+    PendingAndAsked -> PendingTwice
+    asks -> asks

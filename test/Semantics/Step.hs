@@ -17,6 +17,7 @@ module Semantics.Step
   ) where
 
 import qualified Data.Map.Strict as Map
+import qualified Data.Set as Set
 
 import Semantics.Begin
 import Semantics.Program
@@ -29,12 +30,18 @@ import Semantics.Verdict
 step :: State -> [(Event, State)]
 step (State t r) = [(event, State t' r') | (Happens event, t', r') <- steps t r]
 
--- | Time passes, up to the next moment at which something can happen. Only for states
--- in which nothing else can.
-pass :: State -> Maybe State
-pass (State t r) = case filter (> clock t) (moments r) of
-  [] -> Nothing
-  later -> Just (State t {clock = minimum later} r)
+-- | Time passes, up to the next moment at which something can happen; or to a later one, as
+-- long as that makes nothing late by the given number of ticks. Only for states in which
+-- nothing else can happen.
+pass :: Ticks -> State -> [State]
+pass slip (State t r) = case filter (> clock t) (moments r) of
+  [] -> []
+  coming ->
+    [ State t {clock = at} (afterwards r)
+    | let next = minimum coming
+    , at <- Set.toList (Set.fromList coming)
+    , at == next || at < next + slip
+    ]
 
 steps :: Now -> Running -> Steps Running
 steps t = \case
@@ -99,17 +106,17 @@ steps t = \case
   Changing [] end -> if clock t >= end then silently t (Over (Succeeded timeIsUp)) else []
   Called _ (Over result) [] [] -> silently t (Over result)
   Called asks r coming asking ->
-    [(l, t', Called asks r' coming asking) | (l, t', r') <- steps t r]
-      ++ [ (Happens event, t, Called asks' r' coming asking)
-         | Just asks' <- [heard asks]
-         , Just (event, r') <- [hear t r]
-         ]
+    [(l, t', Called asks' (returning r r') coming asking) | (l, t', asks', r') <- running' t asks r]
       ++ case (coming, asking) of
         (Change at condition level : others, _) -> changing at condition level (Called asks r others asking)
         ([], at : others) | clock t >= at -> silently t (Called (askedAgain asks) r [] others)
         _ -> []
+  Returning result -> silently t (Over result)
   Over _ -> []
  where
+  returning before = \case
+    Over result@(Succeeded _) | before /= Returning result -> Returning result
+    r -> r
   -- The steps of those among whom a source is shared.
   lending source ofThose =
     [ (l, t' {shared = drop 1 (shared t')}, (source', those))
@@ -131,7 +138,7 @@ steps t = \case
     l -> l
   forked t' = \case
     Nothing -> thread t' "scoped: fork"
-    Just k -> Thread "scoped: fork" . Living Unasked . Answering k . Starting
+    Just k -> Thread "scoped: fork" . Living Unborn . Answering k . Starting
   withoutCompleted = \case
     main : others -> main : filter (not . completed) others
     [] -> []
@@ -148,6 +155,7 @@ whenSuccessful next = \case
 askedAgain :: Request -> Request
 askedAgain = \case
   Asked -> AskedTwice
+  Pending -> PendingAndAsked
   _ -> Asked
 
 -- | What is left to hear once a request was heard. Nothing: there is none.
@@ -155,43 +163,60 @@ heard :: Request -> Maybe Request
 heard = \case
   Asked -> Just Heard
   AskedTwice -> Just Asked
+  Pending -> Just Heard
+  PendingTwice -> Just Pending
+  PendingAndAsked -> Just Asked
   _ -> Nothing
 
--- | What becomes of it if it hears the request now. Nothing: it cannot.
-hear :: Now -> Running -> Maybe (Event, Running)
+-- | Whether a request is heard before anything else is done.
+isPending :: Request -> Bool
+isPending = (`elem` [Pending, PendingTwice, PendingAndAsked])
+
+-- | The steps of what runs in a thread, with what is left to hear after each.
+running' :: Now -> Request -> Running -> [(Action, Now, Request, Running)]
+running' t asks r
+  | isPending asks, not (null heard') = heard'
+  | otherwise = [(l, t', born, r') | (l, t', r') <- steps t r] ++ heard'
+ where
+  heard' = [(Happens event, t, asks', r') | Just asks' <- [heard asks], (event, r') <- hear t r]
+  born = if asks == Unborn then Unasked else asks
+
+-- | What may become of it if it hears the request now. None: it cannot.
+hear :: Now -> Running -> [(Event, Running)]
 hear t = \case
   Starting _ -> stopped
   Opening _ -> stopped
   Calling _ _ -> stopped
   Acting name until' script
-    | deaf (masking script) -> Nothing
-    | otherwise -> Just (name `Does` Hears, respond name (whenAsked script))
+    | deaf (masking script) -> []
+    | otherwise -> [(name `Does` Hears, respond name (whenAsked script))]
    where
     deaf = \case
       Unmasked -> False
       Masked -> clock t >= until'
       Uninterruptible -> True
-  Cleaning {} -> Nothing
+  Cleaning {} -> []
   Tidying name until'
-    | clock t < until' -> Just (name `Does` Hears, Over (Stopped Nothing))
-    | otherwise -> Nothing
+    | clock t < until' -> [(name `Does` Hears, Over (Stopped Nothing))]
+    | otherwise -> []
   first `AndThen` second -> fmap (\r -> andThen t r second) <$> hear t first
   first `OrElse` second -> fmap (\r -> orElse t r second) <$> hear t first
   Obtaining k r -> within' (Obtaining k) r
   Answering k r -> within' (Answering k) r
-  Looking operator threads -> Just (Silent, conclude operator (Stopped Nothing) nothing threads)
-  Reacting _ source _ phase -> Just (Silent, conclude React (Stopped Nothing) source (threadsOf phase))
-  Sharing source body -> Just (Silent, conclude Share (Stopped Nothing) source [body])
+  Looking operator threads -> [(Silent, conclude operator (Stopped Nothing) nothing some) | some <- started threads]
+  Reacting _ source _ phase -> [(Silent, conclude React (Stopped Nothing) source some) | some <- started (threadsOf phase)]
+  Sharing source body -> [(Silent, conclude Share (Stopped Nothing) source some) | some <- started [body]]
   Concluding operator _ source threads
-    | rested source, all over threads -> Just (Silent, Over (outcome operator (Stopped Nothing) source threads))
-    | otherwise -> Nothing
+    | rested source, all over threads -> [(Silent, Over (outcome operator (Stopped Nothing) source threads))]
+    | otherwise -> []
   Forking _ _ -> stopped
   Forked _ -> stopped
   Changing _ _ -> stopped
-  Called {} -> Nothing
-  Over _ -> Nothing
+  Called {} -> []
+  Returning _ -> stopped
+  Over _ -> []
  where
-  stopped = Just (Silent, Over (Stopped Nothing))
+  stopped = [(Silent, Over (Stopped Nothing))]
   within' around = \case
     Over _ -> stopped
     r -> fmap (whenSuccessful around) <$> hear t r
@@ -200,18 +225,25 @@ hear t = \case
     StopsAfter n -> Cleaning name (clock t + n) Nothing
     TidiesUp n -> Tidying name (clock t + n)
     EndsAfter n how -> Cleaning name (clock t + n) (Just how)
+  -- Between the starts of two branches, too.
+  started threads = case reverse threads of
+    Thread _ (Living Unborn _) : others -> threads : started (reverse others)
+    _ -> [threads]
 
 -- * Branches
 
 threadSteps :: Now -> Thread -> Steps Thread
 threadSteps t (Thread label life) = case life of
-  Living asks r ->
-    [(l, t', becomes asks r') | (l, t', r') <- steps t r]
-      ++ [(Happens event, t, becomes asks' r') | Just asks' <- [heard asks], Just (event, r') <- [hear t r]]
+  -- It has done all that it does, and can still be stopped.
+  Living asks (Returning result) ->
+    [ends' result | not (isPending asks)]
+      ++ [(Happens Silent, t, Thread label (Finished (Stopped Nothing))) | Just _ <- [heard asks]]
+  Living asks r -> [(l, t', becomes asks' r') | (l, t', asks', r') <- running' t asks r]
   Finished result -> [ends' result]
   Ended _ -> []
  where
   becomes asks = \case
+    Over result@(Succeeded _) -> Thread label (Living asks (Returning result))
     Over result -> Thread label (Finished (asOutcome result))
     r -> Thread label (Living asks r)
   ends' result = (Happens (IsOver label), t, Thread label (Ended (asOutcome result)))

@@ -42,6 +42,8 @@ module Behavior.Internal.Runtime
     -- * Watching
   , Event (..)
   , note
+  , isRecorded
+  , runClock
   , reportingTo
   ) where
 
@@ -125,10 +127,13 @@ startSimulated :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> 
 startSimulated finish hook label act simulation = do
   result <- STM.newTVarIO Nothing
   let report event = tell event >> record simulation event
-  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> act)) >>= finish) $ \end ->
+  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> toItsEnd)) >>= finish) $ \end ->
     STM.writeTVar result (Just end) >> hook end
   add threads 1
   pure (Thread thread result)
+ where
+  -- Between its last operation and its end it can still be stopped, as in reality.
+  toItsEnd = act >>= \a -> a <$ pause simulation
 {-# NOINLINE startSimulated #-}
 
 -- | What a thread does (it reports as it is told), and how the action ended.
@@ -284,11 +289,12 @@ now = inSimulation (Seconds <$> getMonotonicTime) clock
 sleep :: Seconds -> IO ()
 sleep seconds = do
   _ <- duration "sleep" seconds
-  when (seconds > 0) $ now >>= \t -> sleepUntil (t + seconds)
+  when (seconds > 0) $ now >>= \t -> sleepBetween t (t + seconds)
 
 -- | Sleeps until the clock shows the given moment, or a later one.
 sleepUntil :: Seconds -> IO ()
-sleepUntil moment = now >>= \t -> sleepBetween t moment
+sleepUntil moment@(Seconds time) =
+  inSimulation (getMonotonicTime >>= \t -> Alarm.sleepBetween t time) (`await` moment)
 
 -- | Sleeps until the second moment. The first is what the clock shows now.
 sleepBetween :: Seconds -> Seconds -> IO ()
@@ -314,6 +320,15 @@ reportingTo sink =
 -- | Says something that whoever watches should know.
 note :: String -> IO ()
 note text = tell (Noted text) >> inSimulation (pure ()) (\simulation -> record simulation (Noted text))
+
+-- | Whether what happens now belongs to what a run is judged by. When a simulated run has
+-- ended, what is left of it is unwound, which does not.
+isRecorded :: IO Bool
+isRecorded = inSimulation (pure True) recording
+
+-- | How to look at the clock of the simulation that the calling thread is part of, later too.
+runClock :: IO (Maybe (IO Seconds))
+runClock = inSimulation (pure Nothing) (pure . Just . lookAtClock)
 
 -- | Reports an event to the sink, if there is one.
 tell :: Event -> IO ()

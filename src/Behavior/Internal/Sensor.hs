@@ -8,8 +8,8 @@ module Behavior.Internal.Sensor
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (evaluate, throwIO)
-import Control.Monad (forever, when)
+import Control.Exception (evaluate, mask, throwIO)
+import Control.Monad (forever, unless, when)
 import Data.IORef (newIORef, readIORef, writeIORef)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
@@ -65,24 +65,27 @@ polling every act = Signal $ \demand -> do
           writeIORef next $! slot + every
           when (readingTimes demand) $ atomically (writeTVar inFlight (Just slot))
           generation <- readTVarIO views
-          read' <- trySynchronous act
-          stopping <- stopRequested
-          if stopping
-            then -- The reading is not wanted any more, and may have swallowed the stop
-            -- request. A fault of its cleanup is not lost.
-              either throwIO (const (pure ())) read'
-            else do
-              changed <- case (published, read') of
-                -- (A view that was asked for meanwhile waits for this reading, whatever it is.)
-                (Published generation' old, Right new) | generation == generation' -> differs old new
-                _ -> pure True
-              when (changed || readingTimes demand) . atomically $ do
-                when changed (writeTVar newest (Just (generation, read')))
-                when (readingTimes demand) (writeTVar inFlight Nothing)
-              now >>= \t' -> readFrom (slotAfter t' (slot + every)) $! case read' of
-                _ | not changed -> published
-                Left _ -> Unpublished
-                Right new -> Published generation new
+          (read', stopping) <- mask $ \restore -> do
+            read' <- trySynchronous (restore act)
+            -- The stop request, if there is one, stays pending until what went wrong has
+            -- been thrown.
+            stopping <- stopRequested
+            -- The reading is not wanted any more, and may have swallowed the stop request.
+            -- A fault of its cleanup is not lost.
+            when stopping (either throwIO (const (pure ())) read')
+            pure (read', stopping)
+          unless stopping $ do
+            changed <- case (published, read') of
+              -- (A view that was asked for meanwhile waits for this reading, whatever it is.)
+              (Published generation' old, Right new) | generation == generation' -> differs old new
+              _ -> pure True
+            when (changed || readingTimes demand) . atomically $ do
+              when changed (writeTVar newest (Just (generation, read')))
+              when (readingTimes demand) (writeTVar inFlight Nothing)
+            now >>= \t' -> readFrom (slotAfter t' (slot + every)) $! case read' of
+              _ | not changed -> published
+              Left _ -> Unpublished
+              Right new -> Published generation new
       differs old new = either (const True) not <$> trySynchronous (evaluate (sameFor demand old new))
       -- The slot, or if that has been missed the next one.
       slotAfter t slot

@@ -50,5 +50,9 @@ data Simulator = Simulator
   -- ^ Waits until that moment.
   , pause :: IO ()
   -- ^ Lets the others run, and lets a cancellation arrive.
+  , recording :: IO Bool
+  -- ^ Whether the run goes on, and what happens belongs to its record.
+  , lookAtClock :: IO Seconds
+  -- ^ What time it is, or was when the run ended; no operation, for any thread at any time.
   , record :: Event -> IO ()
   }

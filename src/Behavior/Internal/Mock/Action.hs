@@ -20,6 +20,7 @@ import Behavior.Internal.Mock.Record
 import Behavior.Internal.Runtime
 import Behavior.Internal.Mock.Script
 import Behavior.Internal.Mock.World
+import Behavior.Internal.Sim.Text
 
 -- $setup
 -- >>> import Behavior
@@ -31,8 +32,8 @@ import Behavior.Internal.Mock.World
 -- last script repeats for ever.
 --
 -- On record come its beginning, how it ends, and when it heard that it was to stop.
--- 'Succeeds' is on record if and only if the action returns. (On real threads
--- a cancellation may come right behind, as behind any action.) Which call gets which
+-- 'Succeeds' is on record if and only if the action returns. (A cancellation may
+-- come right behind, as behind any action.) Which call gets which
 -- script is exact, whoever calls at the same time.
 --
 -- No script, or a name that something else in this world has, is refused with an
@@ -171,8 +172,8 @@ pass seconds since
 ending :: SomeException -> Happening
 ending e
   | isCancellation e = Stops
-  | isFailure e = Fails (maybe (show e) reason (fromException e))
-  | otherwise = Faults (show e)
+  | isFailure e = Fails (legible (maybe (show e) reason (fromException e)))
+  | otherwise = Faults (legible (show e))
  where
   reason (FailedBecause why) = why
   reason Failed = "for no reason given"

@@ -26,7 +26,7 @@ import Control.Concurrent.STM (STM)
 import Control.Exception (ErrorCall (..), Exception, mask_, throwIO)
 import Control.Monad (join, void, when)
 import Data.IORef
-import Data.Maybe (fromMaybe)
+import Data.Maybe (fromMaybe, isNothing)
 
 import Behavior.Internal.Mock.Claim (Claim, verdict)
 import Behavior.Internal.Failure (Behavior)
@@ -45,6 +45,8 @@ import Behavior.Internal.Runtime
 data Mock = Mock
   { origin :: IORef (Maybe Seconds)
   -- ^ When the world's clock was started.
+  , elapsed :: IORef (IO Seconds)
+  -- ^ How long it has gone in a simulation, until that ended; in reality this is zero.
   , names :: IORef [String]
   , noted :: IORef [Entry]
   -- ^ Newest first.
@@ -56,7 +58,7 @@ data Mock = Mock
 --
 -- @since 0.1.0.0
 newMock :: IO Mock
-newMock = Mock <$> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
+newMock = Mock <$> newIORef Nothing <*> newIORef (pure 0) <*> newIORef [] <*> newIORef [] <*> newIORef []
 
 -- | Starts the clock of the world, if it does not go already. Otherwise it starts
 -- when the first action begins, or a condition is looked at for the first time.
@@ -72,14 +74,19 @@ begin = void . clock
 clock :: Mock -> IO (Seconds, Seconds)
 clock mock = do
   t <- now
-  zero <- atomicModifyIORef' (origin mock) $ \started -> let zero = fromMaybe t started in (Just zero, zero)
+  (zero, isFirst) <- atomicModifyIORef' (origin mock) $ \started ->
+    let zero = fromMaybe t started in (Just zero, (zero, isNothing started))
+  when isFirst $ runClock >>= mapM_ (writeIORef (elapsed mock) . fmap (subtract zero))
   pure (zero, t)
 
--- | Notes, which nothing can block or interrupt where exceptions are masked.
+-- | Notes, which nothing can block or interrupt where exceptions are masked. When the run
+-- has ended, the record has.
 tell :: Mock -> Entry -> IO ()
 tell mock entry = do
-  atomicModifyIORef' (noted mock) (\old -> (entry : old, ()))
-  note (show entry)
+  goesOn <- isRecorded
+  when goesOn $ do
+    atomicModifyIORef' (noted mock) (\old -> (entry : old, ()))
+    note (show entry)
 
 -- | Puts a remark of your own on record.
 --
@@ -106,7 +113,8 @@ foretell :: Mock -> (Seconds -> STM [Entry]) -> IO ()
 foretell mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
 
 -- | All that has happened until now. A change of a condition is on record once
--- something later is, whether or not anybody has seen it.
+-- something later is, or a simulated run has come to its time, whether or not anybody has
+-- seen it. The record ends when the run does: what is unwound after that is not on it.
 --
 -- >>> wave <- action mock "wave" [succeeds]
 -- >>> wave
@@ -118,7 +126,8 @@ happened :: Mock -> IO Record
 happened mock = do
   seen <- readIORef (noted mock)
   conditions <- readIORef (unseen mock)
-  due <- atomically (traverse ($ maximum (0 : map happenedAt seen)) conditions)
+  came <- join (readIORef (elapsed mock))
+  due <- atomically (traverse ($ maximum (came : map happenedAt seen)) conditions)
   known <- readIORef (names mock)
   pure (recorded (reverse known) (reverse (join due) ++ seen))
 

@@ -8,6 +8,7 @@ module Behavior.Internal.Sim.Explore
   , randomly
   , exhaustively
   , replaying
+  , endingAt
   , explore
   , exploring
   , Report (..)
@@ -21,6 +22,7 @@ import Data.List (dropWhileEnd, intercalate)
 import Data.Maybe (fromMaybe)
 
 import Behavior.Internal.Failure (Behavior, isCancellation)
+import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
@@ -72,6 +74,18 @@ exhaustively k = Plan (Exhaustive k 1000000) defaults
 -- @since 0.1.0.0
 replaying :: Schedule -> Plan
 replaying s = Plan (Replay s) defaults {detailed = True}
+
+-- | The same schedules, with an end: every run is stopped when the virtual time comes to
+-- this ('endAt'), with 'OutOfTime'. For missions that have no end of their own.
+--
+-- >>> import Control.Monad (forever)
+-- >>> report <- explore (randomly 100 `endingAt` 60) (\simulate -> () <$ simulate (forever (sleep 1)))
+-- >>> schedules report
+-- 100
+--
+-- @since 0.1.0.0
+endingAt :: Plan -> Seconds -> Plan
+endingAt plan end = plan {under = (under plan) {endAt = end}}
 
 -- | What was explored.
 --
@@ -287,7 +301,7 @@ attempting o choosing property = do
             case outcome run of
               Outside _ _ -> improper run
               Meddled _ -> improper run
-              TooSlow _ -> improper run
+              TooSlow _ _ -> improper run
               Misfit _ -> improper run
               _ -> pure run
       improper run = throwIO (ErrorCall (explain (outcome run)))

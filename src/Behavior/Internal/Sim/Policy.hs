@@ -24,6 +24,9 @@ data Decision = Decision
   -- ^ Whether that is the thread which ran: any other is a pre-emption.
   , candidates :: [Int]
   -- ^ All that can run.
+  , candidateCount :: !Int
+  , candidateAt :: Int -> Int
+  -- ^ The same, by their places from 0: of many, to find one takes no time.
   }
 
 -- | How decisions are made.
@@ -94,15 +97,15 @@ random seed = do
       , decide = \d -> do
           wanted <- readIORef due
           if decisionPoint d < wanted
-            then if canGoOn d then pure (Right (usual d)) else Right <$> among below (candidates d)
+            then if canGoOn d then pure (Right (usual d)) else Right <$> among below d
             else do
               further <- gap
               writeIORef due (decisionPoint d + 1 + further)
-              Right <$> among below (candidates d)
+              Right <$> among below d
       , unused = pure []
       }
  where
-  among below these = (these !!) <$> below (length these)
+  among below d = candidateAt d <$> below (candidateCount d)
 
 -- | The exceptions, then the undisturbed schedule; and tells the second action of every
 -- decision that there was after the last exception.

@@ -14,6 +14,7 @@ import Data.List (groupBy, intercalate)
 import Numeric (showFFloat)
 
 import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Sim.Text
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Simulator (Label)
 
@@ -48,9 +49,9 @@ explain = \case
       "something outside of the simulation changed what these waited for (a thread of forkIO or async? \
       \start it by parallel, both or fork)"
         : map waits waiting
-  TooSlow label' ->
-    show label'
-      ++ " ran when the limit of real time was reached: it computes for very long, or for ever (see patience)"
+  TooSlow label' (Seconds t) ->
+    show label' ++ " ran when the limit of real time was reached, at " ++ showFFloat (Just 3) t " s of virtual time: \
+      \it computes for very long, or for ever (see patience), or the behaviour has no end (see endAt)"
   Misfit why -> "the schedule does not fit this behaviour: " ++ why
  where
   waits (Waiting who' what') = show who' ++ " waits for " ++ what'
@@ -64,6 +65,9 @@ instead = \case
   InTransaction ->
     "in a transaction (Control.Concurrent.STM.atomically, or async's wait, race, concurrently): \
     \use Behavior.Time.atomically, parallel, both, fork"
+  InThunk ->
+    "for a value that another thread is computing (it was lazy, and to compute it waits, \
+    \or takes longer than patience): compute it before, by evaluate"
   InThrowing -> "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork"
   Elsewhere ->
     "for something that this library knows nothing of (threadDelay): \
@@ -111,4 +115,4 @@ commas = intercalate ", " . map show
 
 -- | What an exception says of itself, without GHC's own additions.
 text :: SomeException -> String
-text (SomeException e) = displayException e
+text (SomeException e) = legible (displayException e)

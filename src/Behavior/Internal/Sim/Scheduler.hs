@@ -7,9 +7,8 @@
 --
 -- All operations begin in 'operation', where the task that has the turn may hand it on.
 --
--- An exception is not thrown from outside: its target raises it itself, when it next has
--- the turn, in the place of its operation. Whether it can be heard there is GHC's own rule:
--- unmasked, or masked and the operation has to wait.
+-- What is thrown to a task it raises in the place of its operation, if it can receive it
+-- there; otherwise GHC does, when it unmasks ("Behavior.Internal.Sim.Pending").
 module Behavior.Internal.Sim.Scheduler
   ( simulation
   , launch
@@ -23,10 +22,14 @@ import Control.Monad (unless, void, when)
 import Data.Foldable (for_)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
+import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust)
 import Foreign.StablePtr (newStablePtr)
 
+import Behavior.Internal.Sim.Enabled
+import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.State
+import Behavior.Internal.Sim.Text
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Simulator
@@ -41,21 +44,21 @@ simulation sim =
         me <- readIORef (current sim)
         task <- launch sim (taskNumber me) label' body publish
         maybe (throwIO (ErrorCall "unreachable")) pure (taskThread task)
-    , deliver = \target e -> withTarget target $ \there -> do
-        detail sim (Throws (taskLabel there))
-        operation sim (Delivery there e)
-        arriveAt there e
-    , send = \target e -> withTarget target $ \there -> do
-        detail sim (Throws (taskLabel there))
-        operation sim Free
-        void (enlist sim (Label "interrupt" "messenger") Nothing (Before MaskedUninterruptible (Delivery there e)))
+    , deliver = \target e -> withTarget target $ \me there ->
+        if taskNumber there == taskNumber me
+          then throwTo target e
+          else unlessUnwinding $ throwAt sim (Just me) there e >>= mapM_ (untilRaised there)
+    , send = \target e -> withTarget target $ \me there ->
+        void (enlist sim (taskNumber me) (Label "interrupt" "messenger") Nothing (Before MaskedUninterruptible (Throwing there e)))
     , transact = transaction sim
     , clock = operation sim Free >> readIORef (time sim)
     , await = \moment -> do
         detail sim (Sleeps moment)
         operation sim (Moment moment)
     , pause = operation sim Free
-    , record = \case
+    , recording = not <$> readIORef (unwinding sim)
+    , lookAtClock = readIORef (time sim)
+    , record = \event -> settle sim >> case event of
         Started _ -> noteStep sim Starts
         Ended _ -> pure () -- It ends when that is known: see 'leave'.
         Noted text -> noteStep sim (Says text)
@@ -63,10 +66,14 @@ simulation sim =
  where
   -- One that has ended hears nothing.
   withTarget target act = do
-    all' <- IntMap.elems <$> readIORef (tasks sim)
-    case filter ((== Just target) . taskThread) all' of
-      there : _ -> act there
-      [] -> operation sim Free
+    found <- Map.lookup target <$> readIORef (threads sim)
+    for_ found (detail sim . Throws . taskLabel)
+    operation sim Free
+    me <- readIORef (current sim)
+    for_ found (act me)
+  unlessUnwinding act = readIORef (unwinding sim) >>= \ending -> unless ending act
+  -- The sender can be interrupted meanwhile, and then has thrown nothing.
+  untilRaised there p = operation sim (Delivery there p) `onException` withdraw sim there p
 
 -- | Starts a real thread for a task; it waits for its turn.
 launch :: Sim -> Int -> Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO Task
@@ -77,28 +84,23 @@ launch sim mother label' body publish = do
     self <- readIORef (current sim)
     a <- body (arrive sim self) unmask
     uninterruptibleMask_ (leave sim self (publish a))
-  enlistWith sim mother label' (Just thread) entrance Unstarted
+  enlist sim mother label' (Just (thread, entrance)) Unstarted
 
-enlist :: Sim -> Label -> Maybe ThreadId -> Place -> IO Task
-enlist sim label' thread here = do
-  entrance <- newEmptyMVar
-  me <- readIORef (current sim)
-  enlistWith sim (taskNumber me) label' thread entrance here
-
-enlistWith :: Sim -> Int -> Label -> Maybe ThreadId -> MVar () -> Place -> IO Task
-enlistWith sim mother label' thread entrance here = do
+enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> Place -> IO Task
+enlist sim mother label' thread here = do
+  entrance <- maybe newEmptyMVar (pure . snd) thread
   n <- readIORef (nextNumber sim)
   writeIORef (nextNumber sim) (n + 1)
-  there <- newIORef here
-  nothing <- newIORef Nothing
-  let task = Task n label' thread entrance there nothing mother
+  task <- Task n label' (fst <$> thread) entrance <$> newIORef here <*> newIORef Nothing <*> newIORef [] <*> pure mother
   modifyIORef' (tasks sim) (IntMap.insert n task)
-  pure task
+  for_ (taskThread task) $ \there -> modifyIORef' (threads sim) (Map.insert there task)
+  task <$ file sim task
 
 -- | The scheduling point before an operation. When it returns, the calling task has the
 -- turn and the operation can be done; or it throws what has arrived.
 operation :: Sim -> Operation -> IO ()
 operation sim op = do
+  settle sim
   quick <- keeps sim
   possible' <- if quick then possible sim op else pure False
   unless possible' (handOn sim op)
@@ -112,6 +114,7 @@ keeps sim = tick sim >>= \n -> (n <) <$> readIORef (askingAt sim)
 -- | Runs a transaction, in its turn.
 transaction :: Sim -> STM a -> IO a
 transaction sim act = do
+  settle sim
   detail sim Transacts
   quick <- keeps sim
   done <- if quick then tried else pure Nothing
@@ -150,11 +153,16 @@ handOn sim op = do
       then beingUnwound sim me
       else do
         writeIORef (place me) (Before masking op)
+        file sim me
         next <- choose sim (Just me)
         case next of
           Just task | taskNumber task == taskNumber me -> pure ()
           _ -> for_ next (turnTo sim) >> takeMVar (gate me)
         arrive sim me
+        waiting <- readIORef (pending me)
+        when (masking == MaskedInterruptible && not (null waiting)) $ do
+          possible' <- possible sim op
+          unless possible' receive
 
 turnTo :: Sim -> Task -> IO ()
 turnTo sim task = writeIORef (current sim) task >> putMVar (gate task) ()
@@ -170,25 +178,30 @@ arrive sim me = do
         Nothing -> pure ()
         Just e -> do
           writeIORef (raised me) Nothing
-          noteStep sim (Hears (show e))
+          noteStep sim (Hears (legible (show e)))
           throwIO e
 
 -- | The end of a task is an operation too.
 leave :: Sim -> Task -> STM () -> IO ()
 leave sim me publish = do
   ending <- readIORef (unwinding sim)
-  unless ending (tick sim >> handOn sim Free `catch` \Unwind -> pure ())
+  unless ending $ do
+    settle sim
+    _ <- tick sim
+    handOn sim Free `catch` \Unwind -> pure ()
   STM.atomically publish
   committed sim
   unless (taskNumber me == 0) (noteStep sim Ends)
   modifyIORef' (tasks sim) (IntMap.delete (taskNumber me))
+  for_ (taskThread me) (modifyIORef' (threads sim) . Map.delete)
   writeIORef (place me) Gone
+  withdrawAll sim me
   endingNow <- readIORef (unwinding sim)
   if endingNow
     then putMVar (back sim) ()
     else
       if taskNumber me == 0
-        then conclude sim Over
+        then conclude sim Nothing
         else tick sim >> choose sim Nothing >>= mapM_ (turnTo sim)
 
 -- | The run has ended. Who is not driven yet gives the turn to the driver. Who is has

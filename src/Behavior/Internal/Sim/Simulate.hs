@@ -12,11 +12,13 @@ import Control.Monad (unless, when)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
 import Data.Maybe (isJust)
+import Data.Void (Void, absurd)
 import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
 import Behavior.Internal.Seam
 import Behavior.Internal.Simulator
+import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
 import Behavior.Internal.Sim.State
@@ -27,6 +29,7 @@ import Behavior.Internal.Sim.Watchdog
 -- >>> import Behavior
 -- >>> import Behavior.Sim
 -- >>> import Behavior.Time (now)
+-- >>> import Control.Monad (forever)
 
 -- | Runs a behaviour in a simulation, by the undisturbed schedule.
 --
@@ -57,9 +60,13 @@ simulate = simulateWith defaults
 -- >>> finished run
 -- 2.0
 --
--- >>> run <- simulateWith defaults {endAt = 10} (sleep 3600)
+-- A behaviour without an end is given one:
+--
+-- >>> run <- simulateWith defaults {endAt = 10} (forever (sleep 3))
 -- >>> explain (outcome run)
 -- "the virtual time has come to the end that was set"
+-- >>> finished run
+-- 10.0
 --
 -- @since 0.1.0.0
 simulateWith :: Options -> Behavior a -> IO (Run a)
@@ -107,38 +114,32 @@ simulationNumber = unsafePerformIO (newIORef 0)
 {-# NOINLINE simulationNumber #-}
 
 -- | How the run ended, and how the behaviour did, if it did.
-outcomeOf :: Verdict -> Maybe (Either SomeException a) -> [(Int, Int)] -> Outcome a
-outcomeOf verdict end rest = case verdict of
-  Over -> case (rest, end) of
-    ((p, thread) : _, _) -> Misfit ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
-    ([], Just (Right a)) -> Returned a
-    ([], Just (Left e))
-      | isFailure e -> Failing e
-      | isCancellation e -> Cancelled e
-      | otherwise -> Faulting e
-    ([], Nothing) -> Misfit "unreachable"
-  Hopeless waiting -> Deadlock waiting
-  Standing who' -> Livelock who'
-  Late -> OutOfTime
-  Tampered waiting -> Meddled waiting
-  Stuck who' how -> Outside who' how
-  Slow who' -> TooSlow who'
-  Unfit why -> Misfit why
+outcomeOf :: Maybe (Outcome Void) -> Maybe (Either SomeException a) -> [(Int, Int)] -> Outcome a
+outcomeOf cutOff end rest = case (cutOff, rest, end) of
+  (Just other, _, _) -> absurd <$> other
+  (Nothing, (p, thread) : _, _) -> Misfit ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
+  (Nothing, [], Just (Right a)) -> Returned a
+  (Nothing, [], Just (Left e))
+    | isFailure e -> Failing e
+    | isCancellation e -> Cancelled e
+    | otherwise -> Faulting e
+  (Nothing, [], Nothing) -> Misfit "unreachable"
 
 -- | Ends all tasks, the youngest first, one at a time.
-unwind :: Sim -> Either SomeException Verdict -> IO ()
+unwind :: Sim -> Either SomeException (Maybe (Outcome Void)) -> IO ()
 unwind sim verdict = do
   writeIORef (unwinding sim) True
   writeIORef (askingAt sim) minBound
   when keptTurn recall
+  readIORef (tasks sim) >>= mapM_ (withdrawAll sim)
   writeIORef (driven sim) True
   next
  where
   -- Whoever ran has the turn still.
   keptTurn = case verdict of
     Left _ -> True
-    Right (Stuck _ _) -> True
-    Right (Slow _) -> True
+    Right (Just (Outside _ _)) -> True
+    Right (Just (TooSlow _ _)) -> True
     Right _ -> False
 
   -- It gives it back at its next operation, or at its end. If it does not come to either,

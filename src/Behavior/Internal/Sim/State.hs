@@ -8,7 +8,6 @@ module Behavior.Internal.Sim.State
   ( -- * Simulations
     Sim (..)
   , newSim
-  , Verdict (..)
   , conclude
 
     -- * Tasks
@@ -16,6 +15,7 @@ module Behavior.Internal.Sim.State
   , Place (..)
   , Operation (..)
   , Look (..)
+  , Pending (..)
   , Unwind (..)
 
     -- * Counting
@@ -34,6 +34,9 @@ import Control.Monad (unless, when)
 import Data.IORef
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
+import Data.Map.Strict (Map)
+import qualified Data.Map.Strict as Map
+import Data.Void (Void)
 
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Sim.Policy
@@ -50,6 +53,14 @@ data Sim = Sim
   -- ^ Who has the turn.
   , tasks :: !(IORef (IntMap Task))
   -- ^ Those that have not ended.
+  , threads :: !(IORef (Map ThreadId Task))
+  -- ^ The same, but for messengers, by their threads.
+  , ready :: !(IORef (Map Int Task))
+  -- ^ Those that can use the turn, and still can when others have had it.
+  , awaiting :: !(IORef (IntMap Task))
+  -- ^ Those at a transaction, which others may make possible or impossible.
+  , sleepers :: !(IORef (Map (Seconds, Int) Task))
+  -- ^ Those that sleep, by the moment at which they are due.
   , nextNumber :: !(IORef Int)
   , time :: !(IORef Seconds)
   , counter :: !(IORef Int)
@@ -66,8 +77,9 @@ data Sim = Sim
   -- ^ The decisions that were not the usual ones, the latest first.
   , history :: !(IORef [Step])
   -- ^ The latest first.
-  , over :: !(MVar Verdict)
-  -- ^ How the run ended. Who puts it has no turn any more.
+  , over :: !(MVar (Maybe (Outcome Void)))
+  -- ^ How the run ended. Nothing: as the behaviour did. The thread that puts it has no turn
+  -- any more.
   , unwinding :: !(IORef Bool)
   -- ^ The run has ended; now its tasks are.
   , driven :: !(IORef Bool)
@@ -78,17 +90,6 @@ data Sim = Sim
   -- ^ How many operations the task that is being unwound has tried.
   }
 
--- | How a run ended, when it is not that the behaviour did.
-data Verdict
-  = Over
-  | Hopeless [Waiting]
-  | Standing [Label]
-  | Late
-  | Tampered [Waiting]
-  | Stuck Label Blocked
-  | Slow Label
-  | Unfit String
-
 -- | A simulated thread; or a messenger, which has no thread and only throws.
 data Task = Task
   { taskNumber :: !Int
@@ -97,7 +98,9 @@ data Task = Task
   , gate :: !(MVar ())
   , place :: !(IORef Place)
   , raised :: !(IORef (Maybe SomeException))
-  -- ^ What was thrown to it and has arrived; it raises that when it has the turn.
+  -- ^ What was thrown to it where it could receive it; it raises that when it has the turn.
+  , pending :: !(IORef [Pending])
+  -- ^ What was thrown to it where it could not, the newest first.
   , parent :: !Int
   }
 
@@ -112,7 +115,21 @@ data Operation
   = Free
   | Transaction (IO Bool) !(IORef Look)
   | Moment !Seconds
-  | Delivery !Task SomeException
+  | -- | A messenger is about to throw.
+    Throwing !Task SomeException
+  | -- | What it has thrown is pending.
+    Delivery !Task !Pending
+
+-- | An exception that GHC itself will raise in its target, as soon as that unmasks: a real
+-- thread, on the capability of all tasks, is blocked in a real 'throwTo'.
+data Pending = Pending
+  { helper :: !ThreadId
+  , thrown :: SomeException
+  , released :: !(IORef Bool)
+  -- ^ Whether it was raised or withdrawn, or its target has ended.
+  , sender :: !(Maybe Task)
+  -- ^ The task that waits for it to be raised; a messenger does not.
+  }
 
 -- | Whether a transaction would have run, when so many had been run.
 data Look = Look !Int !Bool
@@ -135,10 +152,15 @@ newSim o p = do
   box <- newEmptyMVar
   nowhere <- newIORef Unstarted
   nothing <- newIORef Nothing
-  let noTask = Task (-1) (Label "nobody" "") Nothing box nowhere nothing (-1)
+  none <- newIORef []
+  let noTask = Task (-1) (Label "nobody" "") Nothing box nowhere nothing none (-1)
   Sim o p here
     <$> newIORef noTask
     <*> newIORef IntMap.empty
+    <*> newIORef Map.empty
+    <*> newIORef Map.empty
+    <*> newIORef IntMap.empty
+    <*> newIORef Map.empty
     <*> newIORef 0
     <*> newIORef 0
     <*> newIORef 0
@@ -159,7 +181,7 @@ turns :: Int
 turns = 1000
 
 -- | Ends the run. If somebody else has ended it meanwhile, the turn goes to the driver.
-conclude :: Sim -> Verdict -> IO ()
+conclude :: Sim -> Maybe (Outcome Void) -> IO ()
 conclude sim verdict = do
   first <- tryPutMVar (over sim) verdict
   unless first (putMVar (back sim) ())

@@ -1,3 +1,5 @@
+{-# LANGUAGE DeriveFunctor #-}
+
 -- |
 -- What goes into a simulation, and what comes out of it.
 module Behavior.Internal.Sim.Types
@@ -27,12 +29,17 @@ data Options = Options
   { scheduled :: Schedule
   -- ^ Which thread runs when several could.
   , endAt :: Seconds
-  -- ^ The virtual time at which the run is stopped ('OutOfTime'); infinite by default.
+  -- ^ The virtual time at which the run is stopped ('OutOfTime'), also if by then no thread
+  -- can do anything any more; infinite by default.
   , standstill :: Int
   -- ^ After so many scheduling points without progress of the virtual time the run is
   -- stopped ('Livelock'); 100,000 by default.
   , patience :: Seconds
-  -- ^ After so much real time the run is stopped ('TooSlow'); 60 s by default.
+  -- ^ After so much real time the run is stopped ('TooSlow'); 9 s by default.
+  , slip :: Seconds
+  -- ^ A sleeper may be late by less than this: whenever time moves, the schedule may let it
+  -- move on to any moment at which a sleeper is due, less than this after the first. By
+  -- default 0: timers are exact.
   , detailed :: Bool
   -- ^ Whether 'steps' has every operation, and not only what happened to threads and what
   -- was noted; by default it has not.
@@ -47,7 +54,8 @@ defaults =
     { scheduled = Undisturbed
     , endAt = 1 / 0
     , standstill = 100000
-    , patience = 60
+    , patience = 9
+    , slip = 0
     , detailed = False
     }
 
@@ -104,10 +112,11 @@ data Outcome a
     Outside Label Blocked
   | -- | Something that is not part of the simulation changed what these threads waited for.
     Meddled [Waiting]
-  | -- | The real time came to 'patience', while this thread ran.
-    TooSlow Label
+  | -- | The real time came to 'patience', while this thread ran; the virtual time was this.
+    TooSlow Label Seconds
   | -- | The schedule is not one of this behaviour: why not.
     Misfit String
+  deriving (Functor)
 
 -- | Who waits for what.
 --
@@ -128,6 +137,8 @@ data Blocked
     InTransaction
   | -- | Another thread that was thrown to: @throwTo@, @killThread@, @cancel@.
     InThrowing
+  | -- | A value that another thread was computing, up to 'patience'.
+    InThunk
   | -- | Anything else.
     Elsewhere
   deriving (Eq, Show)

@@ -94,21 +94,23 @@ look sim before = do
           -- Nothing more can be done with one that does not even hear that it should
           -- stop, not even a regular exit.
           when (t - since sight > allowed + 5) (giveUp runner)
-          tell sight (Slow (taskLabel runner))
+          came <- readIORef (time sim)
+          let computes = TooSlow (taskLabel runner) came
+          tell sight (if status == ThreadBlocked BlockedOnBlackHole then Outside (taskLabel runner) InThunk else computes)
       | n == atPoint sight, Just how <- blocked status -> do
           let seen = sight {waits = waits sight + 1}
           -- Whoever was to be unwound, and waits elsewhere for it, is left behind.
           when (waits seen >= 400) (void (tryPutMVar (back sim) ()))
-          if waits seen < 100 then pure seen else tell seen (Stuck (taskLabel runner) how)
+          if waits seen < 100 then pure seen else tell seen (Outside (taskLabel runner) how)
       | otherwise -> pure sight {atPoint = n, waits = 0}
  where
   Seconds allowed = patience (options sim)
   tell sight verdict = do
-    unless (told sight) (void (tryPutMVar (over sim) verdict))
+    unless (told sight) (void (tryPutMVar (over sim) (Just verdict)))
     pure sight {told = True}
 
--- | In what a thread waits. (Foreign calls are allowed: they end by themselves, or else
--- run into the limit of real time.)
+-- | In what a thread waits. (Foreign calls are allowed, and to wait for what another thread
+-- computes: that ends by itself, or else runs into the limit of real time.)
 blocked :: ThreadStatus -> Maybe Blocked
 blocked (ThreadBlocked reason) = case reason of
   BlockedOnMVar -> Just InMVar

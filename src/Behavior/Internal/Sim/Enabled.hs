@@ -1,0 +1,126 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Which tasks can use the turn.
+--
+-- Every task that has not ended, but for the one that has the turn, is in at most one of
+-- three places: 'ready', 'awaiting', 'sleepers'. It is in none of them while it waits for
+-- what it has thrown to be raised. So a choice does not have to look at all tasks.
+module Behavior.Internal.Sim.Enabled
+  ( file
+  , unfile
+  , enabled
+  , possible
+  , receives
+  , Receives (..)
+  , wakeUntil
+  ) where
+
+import Control.Exception (MaskingState (..))
+import Control.Monad (filterM, unless, when)
+import Data.Foldable (for_)
+import Data.IORef
+import qualified Data.IntMap.Strict as IntMap
+import Data.Map.Strict (Map)
+import qualified Data.Map.Strict as Map
+import Data.Maybe (isJust)
+
+import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Sim.State
+
+-- | Puts a task where it belongs, when its place or what was thrown to it has changed.
+file :: Sim -> Task -> IO ()
+file sim task = do
+  unfile sim task
+  place' <- readIORef (place task)
+  certain <- canRaise place'
+  case place' of
+    Gone -> pure ()
+    _ | certain -> intoReady
+    Unstarted -> intoReady
+    Before _ op -> case op of
+      Transaction _ _ -> modifyIORef' (awaiting sim) (IntMap.insert (taskNumber task) task)
+      Moment t -> do
+        due <- possible sim op
+        if due then intoReady else modifyIORef' (sleepers sim) (Map.insert (t, taskNumber task) task)
+      Delivery _ _ -> possible sim op >>= \is -> when is intoReady
+      Throwing _ _ -> intoReady
+      Free -> intoReady
+ where
+  intoReady = modifyIORef' (ready sim) (Map.insert (taskNumber task) task)
+  -- Whatever becomes of its operation, it can run: if it has to wait, it receives.
+  canRaise place' = do
+    arrived <- isJust <$> readIORef (raised task)
+    waiting <- not . null <$> readIORef (pending task)
+    pure $ arrived || case place' of
+      Before MaskedInterruptible _ -> waiting
+      _ -> False
+
+-- | Takes a task out: it has the turn, or has ended.
+unfile :: Sim -> Task -> IO ()
+unfile sim task = do
+  modifyIORef' (ready sim) (Map.delete (taskNumber task))
+  readIORef (place task) >>= \case
+    Before _ (Transaction _ _) -> modifyIORef' (awaiting sim) (IntMap.delete (taskNumber task))
+    Before _ (Moment t) -> modifyIORef' (sleepers sim) (Map.delete (t, taskNumber task))
+    _ -> pure ()
+
+-- | Those that could use the turn.
+enabled :: Sim -> IO (Map Int Task)
+enabled sim = do
+  certain <- readIORef (ready sim)
+  waiting <- readIORef (awaiting sim)
+  able <- filterM (canCommit . snd) (IntMap.toAscList waiting)
+  pure (Map.union (Map.fromDistinctAscList able) certain)
+ where
+  canCommit task =
+    readIORef (place task) >>= \case
+      Before _ op -> possible sim op
+      _ -> pure False
+
+-- | Whether the operation can be done now.
+possible :: Sim -> Operation -> IO Bool
+possible sim = \case
+  Free -> pure True
+  Throwing _ _ -> pure True
+  Moment t -> (t <=) <$> readIORef (time sim)
+  Delivery _ p -> readIORef (released p)
+  Transaction wouldRun look -> do
+    Look looked was <- readIORef look
+    n <- readIORef (commits sim)
+    if looked == n
+      then pure was
+      else do
+        is <- wouldRun
+        is <$ writeIORef look (Look n is)
+
+-- | What becomes of an exception that is thrown to a task now.
+data Receives
+  = AtOnce
+  | Later
+  | -- | It has ended.
+    Never
+
+-- | GHC's own rule: an exception is received unmasked, or masked at an operation that has
+-- to wait. One that has arrived comes first: its handler, to which the next is thrown, is
+-- masked. A thread is masked until it has begun. (One with something pending has not begun
+-- to wait, or it would have received that.)
+receives :: Sim -> Task -> IO Receives
+receives sim target = do
+  arrived <- isJust <$> readIORef (raised target)
+  waiting <- not . null <$> readIORef (pending target)
+  readIORef (place target) >>= \case
+    Gone -> pure Never
+    Before Unmasked _ | not arrived -> pure AtOnce
+    Before MaskedInterruptible op | not (arrived || waiting) -> do
+      is <- possible sim op
+      pure (if is then Later else AtOnce)
+    _ -> pure Later
+
+-- | The time has come to this moment: the sleepers that are due can run.
+wakeUntil :: Sim -> Seconds -> IO ()
+wakeUntil sim t = do
+  (due, others) <- Map.spanAntitone ((<= t) . fst) <$> readIORef (sleepers sim)
+  unless (Map.null due) $ do
+    writeIORef (sleepers sim) others
+    for_ (Map.elems due) $ \task -> modifyIORef' (ready sim) (Map.insert (taskNumber task) task)

@@ -1,0 +1,119 @@
+-- |
+-- Exceptions that are thrown from one task to another, and raised where GHC raises them.
+--
+-- One that its target can receive where it stands is raised by the target itself, when that
+-- next has the turn. Any other is put into GHC's own queue: a helper, a real thread, is
+-- blocked in a real 'throwTo'. So GHC raises it, at the very unmask, and in GHC's order.
+-- The helper is on the same capability, where GHC wakes it as it raises the exception: to
+-- look at the helper's state, which no other thread changes meanwhile, is no race.
+module Behavior.Internal.Sim.Pending
+  ( throwAt
+  , withdraw
+  , withdrawAll
+  , settle
+  , receive
+  ) where
+
+import Control.Concurrent
+import Control.Exception
+import Control.Monad (unless, when)
+import Data.Foldable (for_)
+import Data.IORef
+import qualified Data.Map.Strict as Map
+import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
+import GHC.IO (unsafeUnmask)
+
+import Behavior.Internal.Sim.Enabled
+import Behavior.Internal.Sim.State
+import Behavior.Internal.Sim.Text
+import Behavior.Internal.Sim.Types
+
+-- | Throws to a task, now. What is pending then, if that cannot receive it where it stands.
+throwAt :: Sim -> Maybe Task -> Task -> SomeException -> IO (Maybe Pending)
+throwAt sim from target e = do
+  how <- receives sim target
+  case how of
+    Never -> pure Nothing
+    AtOnce -> do
+      writeIORef (raised target) (Just e)
+      -- If the target itself waits in a 'throwTo', that has ended by this.
+      here <- readIORef (place target)
+      case here of
+        Before _ (Delivery further p) -> withdraw sim further p
+        _ -> pure ()
+      Nothing <$ file sim target
+    Later -> do
+      p <- pend
+      modifyIORef' (pending target) (p :)
+      Just p <$ file sim target
+ where
+  pend = do
+    thread <- maybe (throwIO (ErrorCall "unreachable")) pure (taskThread target)
+    free <- newIORef False
+    helping <- mask_ $ forkOnWithUnmask (capability sim) (\unmask -> unmask (throwTo thread e))
+    untilBlocked helping
+    pure Pending {helper = helping, thrown = e, released = free, sender = from}
+  untilBlocked helping = do
+    status <- threadStatus helping
+    unless (isBlocked status || isOver status) (yield >> untilBlocked helping)
+
+isBlocked, isOver :: ThreadStatus -> Bool
+isBlocked = (== ThreadBlocked BlockedOnException)
+isOver status = status `elem` [ThreadFinished, ThreadDied]
+
+-- | Takes back what is pending for the target.
+withdraw :: Sim -> Task -> Pending -> IO ()
+withdraw sim target p = do
+  done <- readIORef (released p)
+  unless done $ do
+    uninterruptibleMask_ (release p)
+    modifyIORef' (pending target) (filter ((/= helper p) . helper))
+    -- It was ready because of this, if it does not have the turn.
+    was <- Map.member (taskNumber target) <$> readIORef (ready sim)
+    when was (file sim target)
+
+-- | The target has ended, or the run has.
+withdrawAll :: Sim -> Task -> IO ()
+withdrawAll sim target = do
+  all' <- readIORef (pending target)
+  writeIORef (pending target) []
+  for_ all' $ \p -> release p >> wakeSender sim p
+
+-- | Ends the helper, which has ended when this returns.
+release :: Pending -> IO ()
+release p = do
+  writeIORef (released p) True
+  killThread (helper p)
+  untilOver p
+
+untilOver :: Pending -> IO ()
+untilOver p = threadStatus (helper p) >>= \status -> unless (isOver status) (yield >> untilOver p)
+
+wakeSender :: Sim -> Pending -> IO ()
+wakeSender sim p = for_ (sender p) (file sim)
+
+-- | Notes what was raised in the task that has the turn, since this was done last.
+settle :: Sim -> IO ()
+settle sim = do
+  me <- readIORef (current sim)
+  all' <- readIORef (pending me)
+  unless (null all') (settled sim me all')
+{-# INLINE settle #-}
+
+settled :: Sim -> Task -> [Pending] -> IO ()
+settled sim me all' = do
+  (still, gone) <- partitionM (fmap isBlocked . threadStatus . helper) all'
+  writeIORef (pending me) still
+  for_ gone $ \p -> do
+    untilOver p
+    writeIORef (released p) True
+    noteStep sim (Hears (legible (show (thrown p))))
+    wakeSender sim p
+ where
+  partitionM test list = do
+    tested <- traverse (\x -> (,) x <$> test x) list
+    pure ([x | (x, True) <- tested], [x | (x, False) <- tested])
+
+-- | The task is about to wait, interruptibly: so it receives something that is pending.
+receive :: IO ()
+receive = unsafeUnmask (pure ())

@@ -1,0 +1,23 @@
+-- |
+-- The text of what a user has written.
+module Behavior.Internal.Sim.Text
+  ( legible
+  ) where
+
+import Control.Exception (SomeException, evaluate, throwIO, try)
+import System.IO.Unsafe (unsafePerformIO)
+
+import Behavior.Internal.Failure (isCancellation)
+
+-- | The text up to where to compute it throws, which is said then: what describes an
+-- exception must not throw another.
+legible :: String -> String
+legible text = case unsafePerformIO (try (evaluate text) >>= either failing pure) of
+  [] -> []
+  c : rest -> case unsafePerformIO (try (evaluate c) >>= either (fmap Left . failing) (pure . Right)) of
+    Left instead -> instead
+    Right known -> known : legible rest
+ where
+  failing e
+    | isCancellation e = throwIO (e :: SomeException)
+    | otherwise = pure "<its text throws an exception>"

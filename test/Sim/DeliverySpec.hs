@@ -1,0 +1,268 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- Where an exception that is thrown from one simulated thread to another is raised.
+module Sim.DeliverySpec (spec) where
+
+import Control.Concurrent
+import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+import qualified Control.Concurrent.STM as STM
+import Control.Exception hiding (Deadlock)
+import Control.Monad (forM_, unless, void)
+import Data.IORef
+import Data.List (isInfixOf, nub)
+import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
+import System.Mem (performMajorGC)
+import System.Mem.Weak (deRefWeak)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Internal.Runtime
+import Behavior.Parallel (firstOf)
+import qualified Behavior.Signal as Signal
+import Behavior.Sim
+import Behavior.Time (timeout)
+import Support hiding (note)
+
+spec :: Spec
+spec = guarded $ do
+  describe "An exception that finds its target masked is raised" $ do
+    describe "at the unmask, under every one of 1,000 schedules," atTheUnmask
+    describe "as GHC does:" asGHC
+  describe "The thread that has thrown it" senders
+  describe "A branch" endOfBranch
+
+-- | How the run ended, under 1,000 schedules.
+everyEnd :: Show a => Behavior a -> IO [String]
+everyEnd act = nub . map (told . outcome) <$> mapM (\seed -> simulateWith defaults {scheduled = Seeded seed} act) [1 .. 1000]
+ where
+  told end = case end of
+    Returned a -> show a
+    other -> explain other
+
+atTheUnmask :: Spec
+atTheUnmask = do
+  late "if a checkpoint follows" (deaf >> checkpoint)
+  late "if the clock is read" (deaf >> void now)
+  late "if a checkpoint is unmasked within a mask" (mask $ \restore -> deaf >> restore checkpoint)
+  late "if nothing follows" deaf
+  late "if what is unmasked within a mask does nothing" (mask $ \restore -> deaf >> restore (pure ()))
+  late "if it waits for a loser that is slow to stop" (firstOf [sleep 0.1, sleep 9 `onException` deaf])
+ where
+  late name act = it name $ everyEnd (timeout 0.15 (act >> pure "done") ? pure "timed out") `shouldReturn` [show "timed out"]
+  deaf = uninterruptibleMask_ (sleep 0.2)
+
+-- | Runs a thread, which says when it is masked, beside those that throw to it; and gives what
+-- it has written down, and then how it ended.
+thrownAt :: ((String -> IO ()) -> IO () -> IO ()) -> (ThreadId -> IO ()) -> Behavior [String]
+thrownAt target throws = do
+  book <- newIORef []
+  masked <- newTVarIO False
+  let say text = modifyIORef book (text :)
+      ready = atomically (writeTVar masked True)
+  thread <- mask_ (start (Label "target" "") (target say ready))
+  atomically (readTVar masked >>= STM.check)
+  throws (threadId thread)
+  end <- atomically (threadEnd thread)
+  say (either show (const "returned") end)
+  reverse <$> readIORef book
+
+asGHC :: Spec
+asGHC = do
+  it "several in the order in which GHC raises them" $ do
+    run <- simulate $ do
+      opened <- newTVarIO False
+      thrownAt
+        ( \say ready -> mask $ \restore -> do
+            ready
+            uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
+            untilNone (restore (pure ())) say
+        )
+        (\target -> mapM_ (\name -> send' target name >> sleep 1) ["a", "b", "c"] >> atomically (writeTVar opened True))
+    order <- realOrder ["a", "b", "c"]
+    returned run `shouldBe` Just (order ++ ["returned"])
+  it "not at an operation that need not wait, but at one that has to" $ do
+    run <- simulate $ do
+      opened <- newTVarIO False
+      thrownAt
+        ( \say ready -> mask_ $ do
+            ready
+            uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
+            checkpoint >> say "went on"
+            _ <- now
+            say "and on"
+            atomically STM.retry `catch` \(e :: Cancel) -> say (show e)
+        )
+        (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
+    returned run `shouldBe` Just ["went on", "and on", show (Cancel "a"), "returned"]
+  it "by interruptible, within a mask" $ do
+    run <- simulate $ do
+      opened <- newTVarIO False
+      thrownAt
+        ( \say ready -> mask_ $ do
+            ready
+            uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
+            say "went on"
+            interruptible (say "not this")
+        )
+        (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
+    returned run `shouldBe` Just ["went on", show (Cancel "a")]
+  it "to a thread that has not started: where it first unmasks" $ do
+    ran <- newIORef False
+    forM_ [1 .. 300] $ \seed -> do
+      writeIORef ran False
+      run <- simulateWith defaults {scheduled = Seeded seed} $ do
+        thread <- mask_ (start (Label "target" "") (checkpoint >> writeIORef ran True >> atomically STM.retry))
+        interrupt (threadId thread) (Cancel "a")
+        atomically (threadEnd thread)
+      fmap (either (show :: SomeException -> String) (\() -> "returned")) (returned run) `shouldBe` Just (show (Cancel "a"))
+  it "to a thread itself: at once, whatever is masked" $ do
+    run <- simulate (uninterruptibleMask_ (myThreadId >>= \me -> interrupt me (Cancel "me") >> pure "went on"))
+    explain (outcome run) `shouldBe` "it was cancelled: " ++ show (Cancel "me")
+  it "and the steps of the run say when" $ do
+    run <- simulate $ do
+      opened <- newTVarIO False
+      thrownAt
+        ( \_ ready -> mask $ \restore -> do
+            ready
+            uninterruptibleMask_ (atomically (readTVar opened >>= STM.check) >> sleep 1)
+            note "unmasks"
+            restore (pure ()) `catch` \(_ :: Cancel) -> note "handles"
+        )
+        (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
+    [(at s, did s) | s <- steps run, label s == Label "target" "", did s `notElem` [Starts, Ends]]
+      `shouldBe` [(2, Says "unmasks"), (2, Hears (show (Cancel "a"))), (2, Says "handles")]
+
+-- | Unmasks until nothing is raised any more.
+untilNone :: IO () -> (String -> IO ()) -> IO ()
+untilNone unmasking say = try unmasking >>= either (\(e :: Cancel) -> say (show e) >> untilNone unmasking say) pure
+
+-- | The order in which GHC raises exceptions that are pending on one thread, all thrown from
+-- its own capability.
+realOrder :: [String] -> IO [String]
+realOrder names = do
+  book <- newIORef []
+  (here, _) <- threadCapability =<< myThreadId
+  end <- newEmptyMVar
+  _ <- mask_ $ forkOnWithUnmask here $ \unmask -> do
+    me <- myThreadId
+    forM_ names $ \name -> do
+      thrower <- forkOnWithUnmask here (\free -> free (throwTo me (Cancel name)))
+      let untilBlocked = threadStatus thrower >>= \s -> unless (s == ThreadBlocked BlockedOnException) (yield >> untilBlocked)
+      untilBlocked
+    untilNone (unmask (pure ())) (\text -> modifyIORef book (text :))
+    putMVar end ()
+  takeMVar end
+  reverse <$> readIORef book
+
+send' :: ThreadId -> String -> IO ()
+send' target name = interruptByMessengers (const (Cancel name)) [target]
+
+returned :: Run a -> Maybe a
+returned run = case outcome run of
+  Returned a -> Just a
+  _ -> Nothing
+
+senders :: Spec
+senders = do
+  it "waits until it was raised" $ do
+    run <- simulate $ do
+      target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (sleep 5)))
+      sleep 1
+      interrupt (threadId target) (Cancel "a")
+      now
+    returned run `shouldBe` Just 5
+  it "goes on when its target ends without, and at once when that has ended" $ do
+    run <- simulate $ do
+      target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (sleep 3 >> throwIO (Fault "bug"))))
+      sleep 1
+      interrupt (threadId target) (Cancel "a")
+      first <- now
+      end <- atomically (threadEnd target)
+      interrupt (threadId target) (Cancel "b")
+      (,,) first <$> now <*> pure (either (show :: SomeException -> String) (\() -> "returned") end)
+    returned run `shouldBe` Just (3, 3, show (Fault "bug"))
+  it "has thrown nothing if it is interrupted while it waits" $
+    everyEnd
+      ( do
+          target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (sleep 5) >> checkpoint))
+          sender <- mask_ (start (Label "sender" "") (sleep 1 >> interrupt (threadId target) (Cancel "a")))
+          sleep 2
+          interrupt (threadId sender) (Cancel "b")
+          (,) <$> fmap shown (atomically (threadEnd sender)) <*> fmap shown (atomically (threadEnd target))
+      )
+      `shouldReturn` [show (show (Cancel "b"), "returned")]
+  it "receives what is pending for itself, and has thrown nothing then" $
+    everyEnd
+      ( do
+          opened <- newTVarIO False
+          target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (sleep 5) >> checkpoint))
+          sender <- mask_ . start (Label "sender" "") $ mask_ $ do
+            uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
+            interrupt (threadId target) (Cancel "a")
+          interruptByMessengers (const (Cancel "b")) [threadId sender]
+          sleep 1
+          atomically (writeTVar opened True)
+          (,) <$> fmap shown (atomically (threadEnd sender)) <*> fmap shown (atomically (threadEnd target))
+      )
+      `shouldReturn` [show (show (Cancel "b"), "returned")]
+  it "is named in a deadlock" $ do
+    run <- simulate $ do
+      target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (atomically STM.retry)))
+      sleep 1
+      interrupt (threadId target) (Cancel "a") :: IO ()
+    explain (outcome run) `shouldSatisfy` ("main waits for target, to hear an exception" `isInfixOf`)
+  it "does not outlive the run" $ do
+    held <- newIORef ()
+    weak <- mkWeakIORef held (pure ())
+    run <- simulate $ do
+      target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (atomically STM.retry)))
+      interruptByMessengers (const (Holding held)) [threadId target]
+      sleep 1 :: IO ()
+      atomically STM.retry :: IO ()
+    explain (outcome run) `shouldSatisfy` ("interrupt: messenger waits for target, to hear an exception" `isInfixOf`)
+    performMajorGC
+    (() <$) <$> deRefWeak weak `shouldReturn` Nothing
+  it "has thrown nothing when the run has ended, and what is left is unwound" $ do
+    book <- newIORef []
+    _ <- simulate $ do
+      target <- mask_ . start (Label "target" "") $ do
+        end <- try (uninterruptibleMask_ (atomically STM.retry))
+        either (\(_ :: SomeException) -> modifyIORef book ("unwound" :)) (\() -> pure ()) end
+      interruptByMessengers (const (Cancel "a")) [threadId target]
+      sleep 1
+      atomically STM.retry :: IO ()
+    readIORef book `shouldReturn` ["unwound"]
+ where
+  shown = either (show :: SomeException -> String) (\() -> "returned")
+
+endOfBranch :: Spec
+endOfBranch = do
+  it "can be stopped after its last operation" $ do
+    ends <- everyEnd $ do
+      target <- mask_ (start (Label "target" "") (sleep 1))
+      sleep 1
+      interruptByMessengers (const (Cancel "a")) [threadId target]
+      either (show :: SomeException -> String) (\() -> "returned") <$> atomically (threadEnd target)
+    ends `shouldMatchList` [show "returned", show (show (Cancel "a"))]
+  it "that has none can be stopped too" $ do
+    did' <- newIORef (0 :: Int)
+    ends <- everyEnd $ do
+      target <- mask_ (start (Label "target" "") (modifyIORef did' (+ 1)))
+      interruptByMessengers (const (Cancel "a")) [threadId target]
+      earlier <- readIORef did'
+      end <- atomically (threadEnd target)
+      at' <- readIORef did'
+      pure (at' > earlier, either (show :: SomeException -> String) (\() -> "returned") end)
+    ends `shouldContain` [show (True, show (Cancel "a"))]
+
+  it "that reads a sensor does not lose the fault of a reading which could not be interrupted" $
+    everyEnd (timeout 1 (Signal.waitUntil (Signal.polling 5 (uninterruptibleMask_ (sleep 2 >> throwIO (Fault "bug")) :: Behavior Bool))))
+      `shouldReturn` ["it faulted: " ++ displayException (Fault "bug")]
+
+newtype Holding = Holding (IORef ())
+
+instance Show Holding where
+  show _ = "Holding"
+
+instance Exception Holding

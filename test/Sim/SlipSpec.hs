@@ -1,0 +1,87 @@
+-- |
+-- Timers that are late.
+module Sim.SlipSpec (spec) where
+
+import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVarIO)
+import Control.Monad (forM_, when)
+import Data.Foldable (traverse_)
+import Data.IORef
+import Data.List (nub, sort)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Parallel (allOf)
+import Behavior.Sim
+import Behavior.Time (atomically, now)
+import Support (guarded)
+
+spec :: Spec
+spec = guarded . describe "Slip" $ do
+  it "of 0 is none: the same schedules, and every sleeper on time" $
+    forM_ [1 .. 200] $ \seed -> do
+      exact <- simulateWith defaults {scheduled = Seeded seed, detailed = True} sleepers
+      again <- simulateWith defaults {scheduled = Seeded seed, detailed = True, slip = 0} sleepers
+      (steps again, schedule again) `shouldBe` (steps exact, schedule exact)
+      late again `shouldBe` Just [0, 0, 0, 0]
+  it "lets a sleeper be overtaken by one that is due less than that later" $ do
+    orders <- ordersWith 0.5 [1, 1.3]
+    sort orders `shouldBe` [[1, 1.3], [1.3, 1]]
+  it "and by none that is due later" $ do
+    ordersWith 0.5 [1, 1.5] `shouldReturn` [[1, 1.5]]
+    ordersWith 0 [1, 1.3] `shouldReturn` [[1, 1.3]]
+  it "makes none late by more than that, and some late" $ do
+    lates <- mapM (\seed -> late <$> simulateWith defaults {scheduled = Seeded seed, slip = 0.5} sleepers) [1 .. 300]
+    forM_ lates $ \l -> l `shouldSatisfy` maybe False (all (\s -> 0 <= s && s < 0.5))
+    lates `shouldSatisfy` any (maybe False (any (> 0)))
+  it "is part of the schedule that a run tells of" $
+    forM_ [1 .. 100] $ \seed -> do
+      one <- simulateWith defaults {scheduled = Seeded seed, slip = 0.5, detailed = True} sleepers
+      other <- simulateWith defaults {scheduled = schedule one, slip = 0.5, detailed = True} sleepers
+      (steps one, schedule one, finished one) `shouldBe` (steps other, schedule other, finished other)
+  it "is explored exhaustively, and is no pre-emption" $ do
+    orders <- newIORef []
+    report <- explore ((exhaustively 0) {under = defaults {slip = 0.5}}) $ \simulated -> do
+      order <- newTVarIO []
+      _ <- simulated (ordered order [1, 1.3, 1.4])
+      readTVarIO order >>= \o -> modifyIORef orders (reverse o :)
+    complete report `shouldBe` True
+    nub . sort <$> readIORef orders
+      `shouldReturn` sort [[1, 1.3, 1.4], [1, 1.4, 1.3], [1.3, 1, 1.4], [1.3, 1.4, 1], [1.4, 1, 1.3], [1.4, 1.3, 1]]
+  it "does not move the time beyond the end that is set" $
+    forM_ [1 .. 50] $ \seed -> do
+      run <- simulateWith defaults {scheduled = Seeded seed, slip = 5, endAt = 2} (both (sleep 1) (sleep 4))
+      finished run `shouldBe` 2
+  it "finds what hangs on exact timers" $ do
+    found <- exploring ((randomly 1000) {under = defaults {slip = 0.1}}) $ \simulated -> do
+      run <- simulated $ do
+        parked <- newTVarIO False
+        both
+          (sleep 1 >> atomically (modifyTVar' parked (const True)))
+          (sleep 1.05 >> readTVarIO parked >>= \is -> when (not is) failed)
+      traverse_ fail [explain (outcome run) | Failing _ <- [outcome run]]
+    either (const "found") show found `shouldBe` "found"
+
+-- | Four that sleep, twice each: how late each is in all.
+sleepers :: Behavior [Seconds]
+sleepers = allOf [lateness (sleepTo s) | s <- [1, 1.2, 1.4, 1.6]]
+ where
+  sleepTo s = (,) s <$ sleep s <*> now
+  lateness act = (\(s, t) -> rounded (t - s)) <$> act
+  rounded t = if abs t < 1e-9 then 0 else t
+
+late :: Run [Seconds] -> Maybe [Seconds]
+late run = case outcome run of
+  Returned l -> Just l
+  _ -> Nothing
+
+ordered :: TVar [Seconds] -> [Seconds] -> Behavior [()]
+ordered order moments = allOf [sleep s >> atomically (modifyTVar' order (s :)) | s <- moments]
+
+-- | The orders in which those that sleep so long wake, in many schedules.
+ordersWith :: Seconds -> [Seconds] -> IO [[Seconds]]
+ordersWith slip' moments = nub <$> mapM one [1 .. 200]
+ where
+  one seed = do
+    order <- newTVarIO []
+    _ <- simulateWith defaults {scheduled = Seeded seed, slip = slip'} (ordered order moments)
+    reverse <$> readTVarIO order
