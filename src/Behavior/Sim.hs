@@ -100,6 +100,7 @@ module Behavior.Sim
   ) where
 
 import Behavior.Internal.Sim.Explore
+import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
