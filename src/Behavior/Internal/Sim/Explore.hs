@@ -9,6 +9,7 @@ module Behavior.Internal.Sim.Explore
   ) where
 
 import Control.Exception hiding (Deadlock)
+import Data.Foldable (toList, traverse_)
 import Data.IORef
 import Data.Maybe (fromMaybe)
 import qualified Data.Sequence as Seq
@@ -102,24 +103,25 @@ exploring (Plan how o) property = case how of
             Nothing -> go (i + 1) (total + size t)
             Just e -> Left <$> reduced i e t
 
-  -- The queue is a stack: it has the alternatives to the choices of one schedule at a time.
-  fullSearch k limit = go 0 0 [emptyPrefix k]
+  -- The queue is a stack: what it holds are the alternatives to the decisions of the
+  -- schedule that was tried last, and of those that this one continues.
+  fullSearch k limit = go 1 0 (emptyPrefix k) []
    where
-    go :: Int -> Int -> [Prefix] -> IO (Either Counterexample Report)
-    go n !total [] = pure (Right (Report n True total))
-    go n !total (prefix : others)
-      | n >= limit = pure (Right (Report n False total))
+    go :: Int -> Int -> Prefix -> [Alternatives] -> IO (Either Counterexample Report)
+    go n !total prefix others
+      | n > limit = pure (Right (Report (n - 1) False total))
       | otherwise = do
           (t, queue) <- branching prefix others
-          case thrown t of
-            Nothing -> go (n + 1) (total + size t) queue
-            Just e -> Left <$> reduced (n + 1) e t
+          case (thrown t, nextPrefix queue) of
+            (Just e, _) -> Left <$> reduced n e t
+            (Nothing, Just (next, rest)) -> go (n + 1) (total + size t) next rest
+            (Nothing, Nothing) -> pure (Right (Report n True (total + size t)))
 
-  -- Runs the undisturbed schedule but for the choices of the prefix; and puts the choices
-  -- that there could be after them in front of the queue.
+  -- Runs the undisturbed schedule but for the choices of the prefix; and puts the
+  -- alternatives to the decisions after them in front of the queue.
   branching prefix others = do
     queue <- newIORef others
-    t <- try' (fully (choices prefix) (modifyIORef' queue . queueAlternatives prefix))
+    t <- try' . fully (choices prefix) $ \d -> traverse_ (\more -> modifyIORef' queue (more :)) (alternatives prefix d)
     (,) t <$> readIORef queue
 
   reduced i e t = do
@@ -133,18 +135,20 @@ exploring (Plan how o) property = case how of
   -- points. So it looks afresh, the schedules with the fewest switches first. What is
   -- queued and can never be tried is left out: it could be much.
   simplest :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
-  simplest known why = go (2000 :: Int) [emptyPrefix 2] Seq.empty
+  simplest known why = go (2000 :: Int) (emptyPrefix 2) [] Seq.empty
    where
-    go budget [] !later
-      | null later || budget <= 0 = pure (known, why)
-      | otherwise = go budget (foldr (:) [] later) Seq.empty
-    go budget (prefix : others) !later
+    go budget prefix others later
       | budget <= 0 || choiceCount prefix >= length known = pure (known, why)
       | otherwise = do
           (t, further) <- branching prefix []
           case thrown t of
             Just e -> pure (choices prefix, e)
-            Nothing -> go (budget - 1) others (Seq.take budget (later <> Seq.fromList further))
+            Nothing -> continue (budget - 1) others (Seq.take budget (later <> Seq.fromList further))
+    continue budget others later = case nextPrefix others of
+      Just (prefix, rest) -> go budget prefix rest later
+      Nothing
+        | null later -> pure (known, why)
+        | otherwise -> continue budget (toList later) Seq.empty
 
   -- Leaves out halves, quarters... of the switches, as long as it still fails.
   shrunk :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)

@@ -1,22 +1,29 @@
-{-# LANGUAGE BangPatterns #-}
-
 -- |
--- How schedules begin that an exhaustive search has yet to try.
+-- How schedules begin that a search has yet to try.
 --
 -- There are many, and each is found during a run that is over when it is tried. So nothing
--- in a prefix is lazy: a thunk would keep the threads of that run. Prefixes that were found
--- in the same run share their beginning; one costs 12 words in the queue.
+-- in the queue is lazy: a thunk would keep the threads of that run. A decision costs about
+-- 20 words there, however many threads were enabled, and the decisions of one run share the
+-- beginning of its schedule.
 module Behavior.Internal.Sim.Prefix
-  ( Prefix
+  ( -- * Prefixes
+    Prefix
   , emptyPrefix
   , choices
   , choiceCount
-  , queueAlternatives
+
+    -- * The queue
+  , Alternatives
+  , alternatives
+  , nextPrefix
   ) where
+
+import Data.IntSet (IntSet)
+import qualified Data.IntSet as IntSet
 
 import Behavior.Internal.Sim.Policy (Decision (..))
 
--- | The choices that differ from the usual ones, and how many pre-emptions may follow.
+-- | The choices that are not the usual ones, and how many pre-emptions may follow them.
 data Prefix = Prefix !Int !Choices
 
 -- | The number of a scheduling point and of the thread that runs there, the latest first.
@@ -32,22 +39,32 @@ emptyPrefix preemptions = Prefix preemptions NoChoice
 choices :: Prefix -> [(Int, Int)]
 choices (Prefix _ latestFirst) = go [] latestFirst
  where
-  go earlier NoChoice = earlier
-  go earlier (Choice p thread before) = go ((p, thread) : earlier) before
+  go later NoChoice = later
+  go later (Choice p thread before) = go ((p, thread) : later) before
 
 choiceCount :: Prefix -> Int
 choiceCount = length . choices
 
--- | Puts the prefix, continued by each unusual choice that this decision allows, in front of
--- the queue.
-queueAlternatives :: Prefix -> Decision -> [Prefix] -> [Prefix]
-queueAlternatives (Prefix preemptions before) d queue
-  | preemptions < cost = queue
-  | otherwise = foldr add queue (candidates d)
+-- | What else could run at a scheduling point: how many pre-emptions may follow, the number
+-- of the point, the threads, and the choices before it.
+data Alternatives = Alternatives !Int !Int !IntSet !Choices
+
+-- | The unusual choices at this decision, which comes after the prefix, if it may have them.
+alternatives :: Prefix -> Decision -> Maybe Alternatives
+alternatives (Prefix preemptions before) d
+  | preemptions < cost || IntSet.null unusual = Nothing
+  | otherwise = Just $! Alternatives (preemptions - cost) (decisionPoint d) unusual before
  where
   cost = if canGoOn d then 1 else 0
-  add thread !rest
-    | thread == usual d = rest
-    | otherwise =
-        let !continued = Prefix (preemptions - cost) (Choice (decisionPoint d) thread before)
-         in continued : rest
+  unusual = IntSet.delete (usual d) (IntSet.fromList (candidates d))
+
+-- | The next prefix, and the rest of the queue. (The threads of one decision are tried in
+-- the order of their numbers.)
+nextPrefix :: [Alternatives] -> Maybe (Prefix, [Alternatives])
+nextPrefix [] = Nothing
+nextPrefix (Alternatives preemptions p threads before : queue) =
+  case IntSet.minView threads of
+    Nothing -> nextPrefix queue
+    Just (thread, others) ->
+      let left = Alternatives preemptions p others before
+       in left `seq` Just (Prefix preemptions (Choice p thread before), left : queue)
