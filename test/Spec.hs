@@ -32,6 +32,7 @@ import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
 import qualified Promises.PromisesSimSpec
 import qualified SemanticsSpec
+import qualified Sim.ExploreSpaceSpec
 import qualified Sim.ExploreSpec
 import qualified Sim.MockSpec
 import qualified Sim.QuickCheckSpec
@@ -67,6 +68,7 @@ main = hspec $ do
     Behavior.ReactiveSpaceSpec.spec
   describe "Simulation" $ do
     Sim.SimulateSpec.spec
+    Sim.ExploreSpaceSpec.spec
     Sim.ExploreSpec.spec
     Sim.RecordSpec.spec
     Sim.MockSpec.spec
