@@ -97,6 +97,7 @@ module Behavior.Sim
   , replaying
   , Report (..)
   , Counterexample (..)
+  , renderSchedule
   ) where
 
 import Behavior.Internal.Sim.Explore

@@ -50,6 +50,7 @@ import Behavior.Sim
   , Search (Exhaustive)
   , Step (at, did, label)
   , defaults
+  , exhaustively
   , explore
   , simulateWith
   )
@@ -68,7 +69,7 @@ observed how = observing (simulateWith limits {scheduled = how})
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
-  report <- explore (Plan (Exhaustive preemptions most) limits) $ \simulated ->
+  report <- explore (exhaustively preemptions) {search = Exhaustive preemptions most, under = limits} $ \simulated ->
     observing simulated world >>= \seen -> modifyIORef' found (Set.insert seen)
   found' <- readIORef found
   pure (found', complete report)

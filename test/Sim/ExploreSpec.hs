@@ -48,7 +48,7 @@ random = do
   it "is the same for the same seed, and another for another" $ do
     let from seed = do
           seen <- newIORef []
-          _ <- explore (Plan (Random 20 seed) defaults) $ \run -> do
+          _ <- explore (randomly 20) {search = Random 20 seed} $ \run -> do
             made <- run (both (sleep 1) (both (sleep 1) (sleep 1)))
             modifyIORef seen (show (schedule made) :)
           readIORef seen
@@ -79,7 +79,7 @@ exhaustive = do
     let undisturbed k = either (const False) complete <$> exploring (exhaustively k) (counting 2)
     (,) <$> undisturbed 0 <*> undisturbed 1 `shouldReturn` (True, False)
   it "says so when there are more schedules than it may run" $ do
-    report <- explore (Plan (Exhaustive 3 50) defaults) $ \run -> void (run (both (sleep 1) (sleep 1)))
+    report <- explore (exhaustively 3) {search = Exhaustive 3 50} $ \run -> void (run (both (sleep 1) (sleep 1)))
     (schedules report, complete report) `shouldBe` (50, False)
 
 counterexample :: Spec
@@ -135,7 +135,7 @@ properties = do
     found <- exploring (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
     either (show . because) show found `shouldBe` "explore: a property simulates only once"
   it "is told of a run that is none" $ do
-    found <- exploring (Plan (Random 1 0) defaults {patience = 0.1}) $ \run ->
+    found <- exploring (randomly 1) {under = defaults {patience = 0.1}} $ \run ->
       void (run (mapM_ (evaluate . length . show) [0 :: Int ..]))
     either (show . because) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
   it "that throws a cancellation ends the exploration" $ do

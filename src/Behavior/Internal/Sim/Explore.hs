@@ -27,11 +27,11 @@ import Behavior.Internal.Sim.Types
 -- >>> import Behavior.Sim
 
 -- | What the property threw once, but not when the same schedule was run again.
-newtype Unrepeatable = Unrepeatable SomeException
+newtype Unrepeatable = Unrepeatable String
 
 instance Show Unrepeatable where
   show (Unrepeatable e) =
-    text e
+    e
       ++ "\nBut when the same schedule was run again, this did not happen. Something in it is not simulated: \
          \a clock, a random number, a thread of forkIO, what an earlier run left behind?"
 
@@ -82,16 +82,21 @@ explore plan property =
 -- @since 0.1.0.0
 exploring
   :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
-exploring (Plan how o) property = case how of
+exploring plan property = case search plan of
   Random n seed -> randomSearch n seed
   Exhaustive k limit -> fullSearch k limit
-  Replay s -> do
+  Replay s -> only s $ \e t ->
+    pure Counterexample {failing = s, because = e, story = happened t, foundAfter = 1, foundBy = plan}
+  Shrink s -> only s (reduced 1)
+ where
+  o = under plan
+  try' chooser' = attempting o chooser' property
+
+  only s onFailure = do
     t <- try' (policy s)
     case thrown t of
       Nothing -> pure (Right (Report 1 True (size t)))
-      Just e -> pure (Left (Counterexample s e (happened t) 1))
- where
-  try' chooser' = attempting o chooser' property
+      Just e -> Left <$> onFailure e t
 
   randomSearch n seed = go 1 0
    where
@@ -128,8 +133,8 @@ exploring (Plan how o) property = case how of
     (fewer, e') <- shrunk (switches t) e
     (fewest, e'') <- simplest fewer e'
     again <- attempting o {detailed = True} (switching True fewest) property
-    let why = fromMaybe (toException (Unrepeatable e'')) (thrown again)
-    pure Counterexample {failing = Switching fewest, because = why, story = happened again, foundAfter = i}
+    let why = fromMaybe (toException (Unrepeatable (showException plan e''))) (thrown again)
+    pure Counterexample {failing = Switching fewest, because = why, story = happened again, foundAfter = i, foundBy = plan}
 
   -- To leave out one switch moves what comes after it, so that the others may miss their
   -- points. So it looks afresh, the schedules with the fewest switches first. What is

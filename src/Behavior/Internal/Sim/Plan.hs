@@ -1,5 +1,3 @@
-{-# LANGUAGE LambdaCase #-}
-
 -- |
 -- What to explore, and what comes of it.
 module Behavior.Internal.Sim.Plan
@@ -10,6 +8,7 @@ module Behavior.Internal.Sim.Plan
   , replaying
   , Report (..)
   , Counterexample (..)
+  , renderSchedule
   ) where
 
 import Control.Exception (Exception, SomeException)
@@ -18,14 +17,30 @@ import Data.List (dropWhileEnd, intercalate)
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Types
 
--- | Which schedules to run, and how.
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Sim
+
+-- | Which schedules to run, and how. Begin with one of 'randomly', 'exhaustively' and
+-- 'replaying', and change what should be different:
+--
+-- >>> let plan = (randomly 1000) {search = Random 1000 7, under = defaults {endAt = 60}}
 --
 -- @since 0.1.0.0
 data Plan = Plan
   { search :: Search
   , under :: Options
   -- ^ Its 'scheduled' is not looked at.
+  , showException :: SomeException -> String
+  -- ^ How the text of a 'Counterexample' shows what the property threw; by default with
+  -- 'Control.Exception.displayException'.
+  , selectSteps :: [Step] -> [Step]
+  -- ^ Which of its steps that text has; by default all. (See 'ofThreads', 'mentioning'.)
   }
+
+-- | The search under the options, and the defaults.
+plan :: Search -> Options -> Plan
+plan s o = Plan {search = s, under = o, showException = text, selectSteps = id}
 
 -- | Which schedules to run.
 --
@@ -37,15 +52,21 @@ data Search
     Exhaustive Int Int
   | -- | This one.
     Replay Schedule
+  | -- | This one; and if the property fails under it, schedules with fewer pre-emptions, to
+    -- find one under which it also fails.
+    Shrink Schedule
   deriving (Eq, Show)
 
 -- | So many random schedules: each has few pre-emptions or many, but mostly few.
 --
--- > randomly n  =  Plan (Random n 0) defaults
+-- The seed is 0: another one tries other schedules.
+--
+-- >>> search (randomly 1000)
+-- Random 1000 0
 --
 -- @since 0.1.0.0
 randomly :: Int -> Plan
-randomly n = Plan (Random n 0) defaults
+randomly n = plan (Random n 0) defaults
 
 -- | All schedules with up to so many pre-emptions, if there are no more than a million:
 -- for small behaviours. (To go on with another thread where one has to wait is no
@@ -53,13 +74,13 @@ randomly n = Plan (Random n 0) defaults
 --
 -- @since 0.1.0.0
 exhaustively :: Int -> Plan
-exhaustively k = Plan (Exhaustive k 1000000) defaults
+exhaustively k = plan (Exhaustive k 1000000) defaults
 
 -- | Only this schedule, told in detail: what a 'Counterexample' says, to see it again.
 --
 -- @since 0.1.0.0
 replaying :: Schedule -> Plan
-replaying s = Plan (Replay s) defaults {detailed = True}
+replaying s = plan (Replay s) defaults {detailed = True}
 
 -- | What was explored.
 --
@@ -92,6 +113,8 @@ data Counterexample = Counterexample
   -- ^ What happened, in detail.
   , foundAfter :: Int
   -- ^ How many schedules were run until one failed.
+  , foundBy :: Plan
+  -- ^ How it was found, and how its text shows it.
   }
 
 instance Show Counterexample where
@@ -99,17 +122,39 @@ instance Show Counterexample where
     intercalate
       "\n"
       [ "schedule " ++ show (foundAfter c) ++ " fails:"
-      , indented (text (because c))
-      , "shrunk to " ++ counted (failing c) ++ ", this happens:"
-      , dropWhileEnd (== '\n') (narrate (story c))
-      , "to see it again: explore (replaying (" ++ show (failing c) ++ "))"
+      , indented (showException (foundBy c) (because c))
+      , renderSchedule c
       ]
    where
     indented = intercalate "\n" . map ("  " ++) . lines
-    counted = \case
-      Switching [] -> "the undisturbed schedule"
-      Switching [_] -> "one switch"
-      Switching several -> show (length several) ++ " switches"
-      other -> show other
 
 instance Exception Counterexample
+
+-- | The text of a counterexample without what the property threw: the schedule, what
+-- happened, and how to replay it.
+--
+-- >>> found <- exploring (exhaustively 1) (\simulate -> simulate (sleep 1) >> fail "always")
+-- >>> either (putStrLn . renderSchedule) print found
+-- shrunk to the undisturbed schedule, this happens:
+--      0.000 s  0 main  sleeps until 1.000 s
+-- to see it again: explore (replaying (Switching []))
+--
+-- @since 0.1.0.0
+renderSchedule :: Counterexample -> String
+renderSchedule c =
+  intercalate
+    "\n"
+    [ schedule' ++ ", this happens" ++ omission ++ ":"
+    , dropWhileEnd (== '\n') (narrate selected)
+    , "to see it again: explore (replaying (" ++ show (failing c) ++ "))"
+    ]
+ where
+  selected = selectSteps (foundBy c) (story c)
+  omission
+    | length selected == length (story c) = ""
+    | otherwise = " (" ++ show (length selected) ++ " of " ++ show (length (story c)) ++ " steps)"
+  schedule' = case failing c of
+    Switching [] -> "shrunk to the undisturbed schedule"
+    Switching [_] -> "shrunk to one switch"
+    Switching several -> "shrunk to " ++ show (length several) ++ " switches"
+    other -> "under the schedule " ++ show other
