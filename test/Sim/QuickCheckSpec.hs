@@ -29,7 +29,7 @@ schedulesTried = do
       run <- simulating (both (sleep s) (sleep t))
       pure (finished run === max s t)
   it "does not hold if it does not under one of them" $ do
-    result <- quickCheckWithResult quiet counting
+    result <- quickCheckWithResult thorough counting
     output result `shouldContain` "shrunk to one switch"
     output result `shouldContain` "to see it again: explore (replaying (Switching [("
     output result `shouldContain` "1 /= 2"
@@ -48,9 +48,9 @@ schedulesTried = do
   it "is the same for the same seed of QuickCheck" $ do
     let generating = underSchedules $ \simulating -> do
           held <- count simulating
-          pure $ \n -> (n :: Int) < 20 .||. held
-    first <- quickCheckWithResult quiet generating
-    second <- quickCheckWithResult quiet {replay = Just (usedSeed first, usedSize first)} generating
+          pure $ \n -> (n :: Int) < 2 .||. held
+    first <- quickCheckWithResult thorough generating
+    second <- quickCheckWithResult thorough {replay = Just (usedSeed first, usedSize first)} generating
     isSuccess first `shouldBe` False
     drop 1 (lines (output second)) `shouldBe` drop 1 (lines (output first))
 
@@ -69,7 +69,7 @@ verdicts = do
       simulating (sleep 1) >> pure (expectFailure True)
     output result `shouldContain` "*** Failed! Passed 500 tests (expected failure)"
   it "one that is expected to fail, and does, holds" $ do
-    result <- quickCheckWithResult quiet . underSchedules $ fmap expectFailure . count
+    result <- quickCheckWithResult thorough . underSchedules $ fmap expectFailure . count
     output result `shouldContain` "+++ OK, failed as expected"
   it "one that covers less than it should fails" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating -> do
@@ -85,7 +85,7 @@ verdicts = do
   it "what is generated inside is shrunk" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating -> do
       _ <- simulating (sleep 1)
-      pure $ \n -> (n :: Int) < 20
+      pure (forAllShrink (choose (0, 1000000)) shrink (\n -> (n :: Int) < 20))
     drop 3 (lines (output result)) `shouldBe` ["to see it again: explore (replaying (Switching []))", "20"]
   it "what is generated inside may be simulated, and what is told is what was shrunk" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating ->
@@ -95,7 +95,7 @@ verdicts = do
     drop 2 (lines (output result))
       `shouldBe` ["     0.000 s  0 main  sleeps until 20.000 s", "to see it again: explore (replaying (Switching []))", "20"]
   it "nothing is shrunk if it is told to shrink nothing" $ do
-    result <- quickCheckWithResult quiet {maxShrinks = 0} counting
+    result <- quickCheckWithResult thorough {maxShrinks = 0} counting
     numShrinks result `shouldBe` 0
     output result `shouldContain` "under the schedule Seeded"
   it "what is generated inside grows with the tests" $ do
@@ -108,7 +108,7 @@ verdicts = do
 several :: Spec
 several = do
   it "are tried" $ do
-    result <- quickCheckWithResult quiet {maxSuccess = 1} (underSchedulesOf 500 count)
+    result <- quickCheckWithResult quiet {maxSuccess = 1} (underSchedulesOf 2000 count)
     isSuccess result `shouldBe` False
   it "are decided by the first that is discarded" $ do
     tried <- newIORef (0 :: Int)
@@ -129,6 +129,10 @@ several = do
 
 quiet :: Args
 quiet = stdArgs {chatty = False, maxSuccess = 500}
+
+-- | One schedule in sixty or so makes 'count' fail.
+thorough :: Args
+thorough = quiet {maxSuccess = 2000}
 
 counting :: Property
 counting = underSchedules count
