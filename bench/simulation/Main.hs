@@ -6,7 +6,7 @@ module Main (main) where
 import Control.Concurrent (runInUnboundThread)
 import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
 import Control.Monad (forM_, void, when)
-import Data.IORef (atomicModifyIORef', newIORef)
+import Data.IORef (atomicModifyIORef', modifyIORef', newIORef, readIORef)
 import GHC.Stats (gc, gcdetails_live_bytes, getRTSStats)
 import System.Environment (getArgs)
 import System.Exit (die)
@@ -53,13 +53,16 @@ speed = do
 memory :: String -> Plan -> IO ()
 memory name plan = do
   tried <- newIORef (0 :: Int)
+  measured <- newIORef []
   void . explore plan $ \simulated -> do
     n <- atomicModifyIORef' tried (\n -> (n + 1, n))
     when (n `elem` [20000, 200000]) $ do
       performMajorGC
       live <- gcdetails_live_bytes . gc <$> getRTSStats
-      line (name ++ " schedules, live " ++ show n) (fromIntegral live)
+      modifyIORef' measured ((n, live) :)
     void (simulated (missionWith (Signal.debounce 0.5)))
+  -- Only now: to print takes memory, too.
+  readIORef measured >>= mapM_ (\(n, live) -> line (name ++ " schedules, live " ++ show n) (fromIntegral live))
   line (name ++ " schedules, resident") =<< peakResidentBytes
 
 -- | A battery that gets low twice, under a limit of time.

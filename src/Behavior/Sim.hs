@@ -86,6 +86,8 @@ module Behavior.Sim
   , Did (..)
   , Label (..)
   , narrate
+  , ofThreads
+  , mentioning
 
     -- * Many runs
   , explore

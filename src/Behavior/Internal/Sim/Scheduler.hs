@@ -42,11 +42,11 @@ simulation sim =
         task <- launch sim (taskNumber me) label' body publish
         maybe (throwIO (ErrorCall "unreachable")) pure (taskThread task)
     , deliver = \target e -> withTarget target $ \there -> do
-        detail sim (Throws (taskLabel there))
+        detail sim (Throws (taskNumber there) (taskLabel there))
         operation sim (Delivery there e)
         arriveAt there e
     , send = \target e -> withTarget target $ \there -> do
-        detail sim (Throws (taskLabel there))
+        detail sim (Throws (taskNumber there) (taskLabel there))
         operation sim Free
         void (enlist sim (Label "interrupt" "messenger") Nothing (Before MaskedUninterruptible (Delivery there e)))
     , transact = transaction sim
