@@ -6,7 +6,7 @@ import Control.Concurrent.STM (modifyTVar', newTVarIO, readTVar, readTVarIO, ret
 import Control.Exception hiding (Deadlock)
 import Control.Monad (unless, void, when)
 import Data.IORef
-import Data.List (isInfixOf, nub, sort)
+import Data.List (isInfixOf, isPrefixOf, nub, sort)
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -106,9 +106,50 @@ counterexample = do
         show c `shouldContain` "shrunk to one switch"
         [words line | line <- lines (show c), "saw" `isInfixOf` line]
           `shouldBe` [ ["0.000", "s", "1", "both:", "left", "saw", "0"]
-                     , ["0.000", "s", "3", "both:", "left", "saw", "0"]
+                     , ["0.000", "s", "3", "both:", "left", "(of", "2)", "saw", "0"]
                      ]
       Right _ -> expectationFailure "it should have been found"
+  it "shows what the property threw as the plan says" $ do
+    found <- exploring (randomly 1000) {showException = const "not two"} (counting 2)
+    take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one switch, this happens:"]
+  it "shows what did not happen again as the plan says" $ do
+    runs <- newIORef (0 :: Int)
+    found <- exploring (randomly 1) {showException = maybe "another" (\(Fault what') -> "fault " ++ what') . fromException} $ \run -> do
+      n <- atomicModifyIORef' runs (\n -> (n + 1, n))
+      _ <- run (pure ())
+      when (n == 0) (throwIO (Fault "once"))
+    either (show . because) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
+  it "shows only the steps that the plan selects, and how many" $ do
+    found <- exploring (randomly 1000) {selectSteps = mentioning ["saw"]} (counting 2)
+    (drop 2 . lines <$> either (Just . show) (const Nothing) found)
+      `shouldBe` Just
+        [ "shrunk to one switch, this happens (2 of 21 steps):"
+        , "     0.000 s  1 both: left         saw 0"
+        , "     0.000 s  3 both: left (of 2)  saw 0"
+        , "to see it again: explore (replaying (Switching [(5,2)]))"
+        ]
+  it "has the steps of some threads" $ do
+    run <- simulate (both (sleep 1) (both (sleep 1) (sleep 1)))
+    map number (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
+  it "tells the branches of two operators apart" $ do
+    run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
+    lines (narrate (mentioning ["starts", "asks"] (steps run)))
+      `shouldBe` [ "     0.000 s  1 both: left              starts"
+                 , "     0.000 s  2 both: right             starts"
+                 , "     0.000 s  3 parallel: left (of 1)   starts"
+                 , "     0.000 s  4 parallel: right (of 1)  starts"
+                 , "     0.000 s  5 parallel: left (of 2)   starts"
+                 , "     0.000 s  6 parallel: right (of 2)  starts"
+                 , "     1.000 s  1 both: left              asks 4 parallel: right to stop"
+                 , "     3.000 s  2 both: right             asks 6 parallel: right to stop"
+                 ]
+    map parentNumber (take 2 (steps run)) `shouldBe` [-1, 0]
+  it "is found from a schedule that fails, by schedules with fewer switches" $ do
+    let first = Seeded 18 -- the eighteenth of those that seed 0 tries
+    found <- exploring (replaying first) {search = Shrink first} (counting 2)
+    either failing (const first) found `shouldBe` Switching [(5, 2)]
+    held <- exploring (replaying Undisturbed) {search = Shrink Undisturbed} (counting 2)
+    either show (show . schedules) held `shouldBe` "1"
   it "of a deadlock tells who waited" $ do
     found <- exploring (randomly 100) $ \run -> do
       made <- run (both (pure ()) (atomically retry :: Behavior ()))
