@@ -11,6 +11,7 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Internal.Runtime (note)
+import Behavior.Parallel (allOf)
 import Behavior.Sim
 import Behavior.Time (atomically, checkpoint)
 import Support hiding (note)
@@ -75,6 +76,13 @@ exhaustive = do
       modifyIORef seen (show (schedule made) :)
     all' <- readIORef seen
     length (nub all') `shouldBe` length all'
+  it "tries the alternatives of the latest decision first, by the numbers of the threads" $ do
+    seen <- newIORef []
+    _ <- explore (exhaustively 0) $ \run -> do
+      made <- run (void (allOf [checkpoint, checkpoint, checkpoint]))
+      modifyIORef seen (schedule made :)
+    take 6 . reverse <$> readIORef seen
+      `shouldReturn` map Switching [[], [(11, 3)], [(8, 3)], [(7, 2)], [(7, 2), (10, 3)], [(7, 3)]]
   it "finds nothing with fewer pre-emptions than a defect needs" $ do
     let undisturbed k = either (const False) complete <$> exploring (exhaustively k) (counting 2)
     (,) <$> undisturbed 0 <*> undisturbed 1 `shouldReturn` (True, False)
@@ -131,6 +139,9 @@ counterexample = do
   it "has the steps of some threads" $ do
     run <- simulate (both (sleep 1) (both (sleep 1) (sleep 1)))
     map number (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
+  it "has the steps in which a name occurs, in a label or in what was done" $ do
+    run <- simulate (both (note "a") (note "left"))
+    [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Says "a"), (1, Ends), (2, Says "left")]
   it "tells the branches of two operators apart" $ do
     run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
     lines (narrate (mentioning ["starts", "asks"] (steps run)))
