@@ -19,13 +19,13 @@ import Behavior.Time (atomically, checkpoint)
 import Measured
 
 main :: IO ()
-main =
-  runInUnboundThread $
-    getArgs >>= \args -> case args of
-      [] -> speed
-      ["memory", "random"] -> memory "random" (randomly most)
-      ["memory", "exhaustive"] -> memory "exhaustive" (exhaustively 5) {search = Exhaustive 5 most}
-      _ -> die "usage: simulation [memory (random | exhaustive)]"
+main = runInUnboundThread $ do
+  arguments <- getArgs
+  case arguments of
+    [] -> speed
+    ["memory", "random"] -> memory "random" (randomly most)
+    ["memory", "exhaustive"] -> memory "exhaustive" (exhaustively 5) {search = Exhaustive 5 most}
+    _ -> die "usage: simulation [memory (random | exhaustive)]"
  where
   most = 1000000
 

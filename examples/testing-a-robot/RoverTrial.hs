@@ -10,8 +10,9 @@ module RoverTrial
   , motorOnly
   ) where
 
-import Control.Exception (SomeException, displayException, fromException)
+import Control.Exception (SomeException (..), displayException)
 import Control.Monad ((>=>))
+import Data.Typeable (cast)
 import Test.HUnit.Lang (HUnitFailure (..), formatFailureReason)
 import Test.Hspec (shouldBe)
 
@@ -67,7 +68,7 @@ wayHome home plan =
 
 -- | Shows a failed expectation as hspec prints it.
 asHspec :: SomeException -> String
-asHspec e = case fromException e of
+asHspec (SomeException e) = case cast e of
   Just (HUnitFailure _ reason) -> formatFailureReason reason
   Nothing -> displayException e
 

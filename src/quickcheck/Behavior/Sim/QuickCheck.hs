@@ -51,6 +51,11 @@ import Behavior (Behavior, Seconds)
 import Behavior.Sim hiding (Counterexample (Counterexample))
 import qualified Behavior.Sim as Sim
 
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Sim
+-- >>> import Test.QuickCheck
+
 -- | Runs a property under a schedule that QuickCheck draws, another for each test.
 --
 -- The property is given a function that simulates under that schedule, once. What it
