@@ -5,6 +5,7 @@ import Test.Hspec
 import qualified Behavior.AlarmSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
+import qualified Behavior.FromOutsideSpec
 import qualified Behavior.MonitorSpec
 import qualified Behavior.NewsSpec
 import qualified Behavior.OperatorsSpec
@@ -22,6 +23,7 @@ import qualified Behavior.ScopedSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
 import qualified Behavior.StormSpec
+import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
 import qualified Examples.DoorBatterySpec
 import qualified Examples.ProgressProblemSpec
@@ -61,6 +63,9 @@ main = hspec $ do
     Behavior.AlarmSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
+  describe "From outside" $ do
+    Behavior.FromOutsideSpec.spec
+    Behavior.ThrowingCleanupSpec.spec
   describe "Promises" Behavior.PromisesSpec.spec
   describe "Storms" Behavior.StormSpec.spec
   describe "Space" $ do

@@ -33,6 +33,8 @@ module Support
   , launching
   , cancelling
   , throwing
+  , awaitThrown
+  , readMessages
   , awaitEnd
   , stillRunning
   , awaitIdle
@@ -172,12 +174,22 @@ cancelling act first = launching act $ \caller -> do
 -- the exception was delivered or is waiting to be.
 throwing :: Exception e => ThreadId -> e -> IO ()
 throwing target e = do
-  thrower <- forkIO (throwTo target e)
+  forkIO (throwTo target e) >>= awaitThrown
+
+-- | Returns once what the thread throws, and then ends, was received or is pending.
+awaitThrown :: ThreadId -> IO ()
+awaitThrown thrower = do
   eventually $ (`elem` [ThreadBlocked BlockedOnException, ThreadFinished]) <$> threadStatus thrower
   -- It may be under way yet, to another capability (and to one more, if the thread was
-  -- moved meanwhile). Each reads what was sent to it before it runs a thread sent later.
+  -- moved meanwhile).
+  replicateM_ 2 readMessages
+
+-- | Returns once each capability has read what was sent to it before: it does so before it
+-- runs a thread that is sent later.
+readMessages :: IO ()
+readMessages = do
   capabilities <- getNumCapabilities
-  replicateM_ 2 . for_ [1 .. capabilities] $ \c -> forkOn c (pure ()) >>= awaitOver
+  for_ [1 .. capabilities] $ \c -> forkOn c (pure ()) >>= awaitOver
 
 awaitEnd :: Async a -> IO (Ending a)
 awaitEnd caller = endingOf <$> waitCatch caller

@@ -1,18 +1,22 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- |
 -- Readings of a polled sensor that go wrong: that fail, hang, cannot be interrupted, or
 -- make trouble when they are; and 'Signal.staleAfter'.
 module Behavior.BadReadingSpec (spec) where
 
 import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM (catchSTM)
 import Control.Exception
 import Control.Monad (void, when)
 import Data.Foldable (for_)
 import Data.Maybe (isJust)
 import Test.Hspec
 
+import Behavior (Failed)
 import Behavior.Internal.Runtime (atomically, now)
 import Behavior.Internal.Scope (SomeBranch (..), ask, outcome, structured)
-import Behavior.Internal.Source (startWorkers)
+import Behavior.Internal.Source (startSensors)
 import qualified Behavior.Internal.Source as Source
 import qualified Behavior.Signal as Signal
 import Support
@@ -185,29 +189,45 @@ stale = do
 
   -- Seen from inside: when the reading began that it knows of.
   it "does not count the time between readings" $ do
-    source <- Source.open (Signal.polling (1 / 0) (pure ()))
-    reading <- Source.reading source
+    source <- Source.open (Signal.polling (1 / 0) (pure ())) Source.anything {Source.readingTimes = True}
+    let reading = Source.inFlightSince source
     atomically reading `shouldReturn` Nothing
     structured $ \scope -> do
-      (seen, _) <- startWorkers scope "test" source
-      atomically (Source.atFirst seen)
+      (seen, _) <- startSensors scope "test" source
+      atomically (Source.firstRead seen)
       atomically reading `shouldReturn` Nothing
       pure (pure ())
 
   it "does not count the time of a recovery, when it was stopped in the middle of a reading" $ do
     entered <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> hang)
-    source <- Source.open (sensing level)
-    reading <- Source.reading source
+    source <- Source.open (sensing level) Source.anything {Source.readingTimes = True}
+    let reading = Source.inFlightSince source
     structured $ \scope -> do
-      (_, workers) <- startWorkers scope "test" source
+      (_, workers) <- startSensors scope "test" source
       pass entered
       began <- atomically reading
       began `shouldSatisfy` isJust
       ask (map SomeBranch workers)
       for_ workers (atomically . outcome)
-      _ <- startWorkers scope "test" source
+      _ <- startSensors scope "test" source
       atomically reading >>= (`shouldSatisfy` (/= began))
+      pure (pure ())
+
+  it "does not forgive a reading that was overdue when it has ended" $ do
+    entered <- newGate
+    mayEnd <- newGate
+    level <- newSensor $ \n -> when (n == 1) (open entered >> pass mayEnd)
+    source <- Source.open (Signal.staleAfter 0.001 (sensing level)) Source.anything
+    structured $ \scope -> do
+      (seen, _) <- startSensors scope "test" source
+      let isStale view = atomically ((False <$ Source.firstRead view) `catchSTM` \(_ :: Failed) -> pure True)
+      pass entered
+      isStale seen `shouldReturn` True
+      open mayEnd
+      -- A view that is asked for later finds the reading that ended in time.
+      eventually $ not <$> (atomically (Source.view source) >>= isStale)
+      isStale seen `shouldReturn` True
       pure (pure ())
 
   it "never fails a signal that is not polled" $ do
@@ -224,7 +244,7 @@ stale = do
       book <- newNotebook
       let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note book "reading"))
       ending (Signal.rSelect signal (note book "left") (note book "right"))
-        `shouldReturn` FaultedWith ("staleAfter: a period is more than zero seconds, not " ++ shown)
+        `shouldReturn` FaultedWith ("staleAfter: a period is at least 0.000001 seconds, not " ++ shown)
       notes book `shouldReturn` []
  where
   tooLong limit = "FailedBecause " ++ show ("no reading of the signal within " ++ limit ++ " s")

@@ -7,16 +7,17 @@ module Behavior.RefinedSpec (spec) where
 import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (throwIO)
-import Control.Monad (replicateM_, unless)
+import Control.Monad (replicateM_, unless, void)
 import Data.Foldable (for_)
 import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (choose, forAll, ioProperty, listOf1, (===))
 
-import Behavior (Seconds)
-import Behavior.Internal.Runtime (atomically, now)
+import Behavior (Seconds, (|||))
+import Behavior.Internal.Runtime (atomically, now, sleep)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (Run (finished), explore, randomly, simulate)
 import Support
 import Watched
 
@@ -27,13 +28,25 @@ spec = guarded $ do
 
 hysteresis :: Spec
 hysteresis = do
+  it "keeps its first state between the thresholds" $
+    for_ [False, True] $ \initial ->
+      Signal.switch (Signal.hysteresis initial 20 80 (pure (50 :: Int))) pure `shouldReturn` initial
+
+  it "keeps its state from one operator to the next, where it is shared" $ do
+    level <- newTVarIO (90 :: Int)
+    Signal.withShared (Signal.hysteresis False 20 80 (dialled level)) $ \charged -> do
+      Signal.switch charged pure `shouldReturn` True
+      atomically (writeTVar level 50)
+      Signal.switch charged pure `shouldReturn` True
+    Signal.switch (Signal.hysteresis False 20 80 (dialled level)) pure `shouldReturn` False
+
   prop "is a fold over the values that were seen" $
     forAll ((,) <$> thresholds <*> listOf1 (choose (0, 10))) $ \((low, high), levels) ->
       ioProperty $ do
         book <- newNotebook
         position <- newTVarIO (0 :: Int)
         let level = (levels !!) <$> dialled position
-            signal = (,) <$> dialled position <*> Signal.hysteresis low high level
+            signal = (,) <$> dialled position <*> Signal.hysteresis False low high level
             branch (n, state) = do
               note book state
               unless (n + 1 == length levels) $ do
@@ -51,7 +64,7 @@ hysteresis = do
             atomically (writeTVar (underlying level) 50)
             eventually ((>= 1) <$> looks level (== self) 50)
             pure "left"
-      Signal.rSelect (Signal.hysteresis 10 90 (recorded level)) left (pure "right")
+      Signal.rSelect (Signal.hysteresis False 10 90 (recorded level)) left (pure "right")
         `shouldReturn` "left"
 
   it "remembers also what changed nothing for its operator" $ do
@@ -59,7 +72,7 @@ hysteresis = do
     level <- newRecorded (0 :: Int)
     armed <- newTVarIO False
     entered <- newGate
-    let signal = (&&) <$> dialled armed <*> Signal.hysteresis 10 90 (recorded level)
+    let signal = (&&) <$> dialled armed <*> Signal.hysteresis False 10 90 (recorded level)
         cool = note book "cool" >> atomically (writeTVar (underlying level) 10)
         task = do
           note book "task"
@@ -79,19 +92,19 @@ hysteresis = do
     let cool = do
           note book =<< readTVarIO level
           atomically (modifyTVar' level (subtract 30))
-    Signal.monitor (Signal.hysteresis 10 90 (dialled level)) cool (pure ())
+    Signal.monitor (Signal.hysteresis False 10 90 (dialled level)) cool (pure ())
     notes book `shouldReturn` [95, 65, 35]
 
   it "decides on the first reading, however long the period" $
     replicateM_ 200 $
-      Signal.rSelect (Signal.hysteresis 0 1 once) (pure "left") (pure "right")
+      Signal.rSelect (Signal.hysteresis False 0 1 once) (pure "left") (pure "right")
         `shouldReturn` "left"
 
   it "refuses thresholds the wrong way round, and nothing starts" $ do
     book <- newNotebook
-    let signal = Signal.hysteresis 2 1 (Signal.polling 0.001 ((1 :: Int) <$ note book "reading"))
+    let signal = Signal.hysteresis False 2 1 (Signal.polling 0.001 ((1 :: Int) <$ note book "reading"))
     ending (Signal.rSelect signal (note book "left") (note book "right"))
-      `shouldReturn` FaultedWith "hysteresis: the lower threshold must not be above the upper one"
+      `shouldReturn` FaultedWith "hysteresis: the lower threshold must be at most the upper one"
     notes book `shouldReturn` []
  where
   thresholds = do
@@ -136,6 +149,21 @@ debounce = do
     dial <- newDial True
     Signal.monitor (Signal.debounce (1 / 0) (watched dial)) (set dial (Says False)) (pure "task")
       `shouldReturn` "task"
+
+  it "counts at once the first value after a recovery, and not the one before, under any schedule" $
+    void . explore (randomly 200) $ \simulated -> do
+      book <- newNotebook
+      level <- newTVarIO True
+      let recovery = note book "recovery" >> atomically (writeTVar level False)
+      run <- simulated (Signal.monitor (Signal.debounce 1 (dialled level)) recovery (note book "task"))
+      finished run `shouldBe` 0
+      notes book `shouldReturn` ["recovery", "task"]
+
+  it "counts a change from when it came last" $ do
+    level <- newTVarIO (0 :: Int)
+    let flicker = for_ [(1, 1), (0.5, 0), (0.25, 1)] $ \(pause, value) -> sleep pause >> atomically (writeTVar level value)
+    run <- simulate (Signal.waitUntil (Signal.debounce 1 ((== 1) <$> dialled level)) ||| (flicker >> hang))
+    finished run `shouldBe` 2.75
 
   it "of no duration follows its signal" $ do
     dial <- newDial True

@@ -125,7 +125,7 @@ firstOf [] = failed
 firstOf behaviors = structured $ \scope -> do
   first <- newTVarIO Nothing
   void $ startAll (\n -> branchThen (tell first n) scope (Label "firstOf" (show n))) behaviors
-  either throwIO pure <$> unlessAtAGlance (toldNow first) (atomically (told first))
+  settle <$> unlessAtAGlance (toldNow first) (atomically (told first))
 
 -- | Starts all at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
@@ -152,7 +152,6 @@ allOf behaviors = structured $ \scope -> do
               _ -> Just <$> told trouble
         maybe (waiting bs) (pure . throwIO) wrong
   waiting branches
-
 -- | The container, with these (as many) for its elements.
 refilled :: Traversable t => t x -> [a] -> t a
 refilled container = snd . flip (mapAccumL next) container
@@ -181,8 +180,8 @@ tell leftmost n x =
     _ -> writeTVar leftmost (Just (n, x))
 
 -- | Tells what a branch threw, if it did.
-tellTrouble :: Told SomeException -> Int -> Either SomeException a -> STM ()
-tellTrouble trouble n = either (tell trouble n) (\_ -> pure ())
+tellTrouble :: Told SomeException -> Int -> Outcome a -> STM ()
+tellTrouble trouble n = either (tell trouble n) (\_ -> pure ()) . result
 
 -- | What was told; retries until something was.
 told :: Told x -> STM x

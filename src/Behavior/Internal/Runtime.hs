@@ -5,8 +5,8 @@
 -- |
 -- The seam: all that the library does with threads, time and waiting goes through
 -- this module. No other module (but the clock that it sleeps by,
--- "Behavior.Internal.Alarm") forks, delays, throws to a thread or waits in a
--- transaction, so a simulation that takes over here has taken over everything.
+-- "Behavior.Internal.Alarm", and "Behavior.Internal.Deadlock") forks, delays, throws to a
+-- thread or waits in a transaction, so a simulation that takes over here has taken over everything.
 --
 -- Each operation is done in reality, or in the simulation that the calling thread
 -- is part of ("Behavior.Internal.Seam").
@@ -18,7 +18,7 @@ module Behavior.Internal.Runtime
   , threadEndSoFar
   , threadEndNow
   , start
-  , startThen
+  , startWith
   , interrupt
   , interruptByMessengers
   , living
@@ -26,6 +26,7 @@ module Behavior.Internal.Runtime
     -- * Waiting
   , atomically
   , firmly
+  , awaitUninterruptibly
   , unlessAtAGlance
   , checkpoint
   , giveWay
@@ -69,61 +70,63 @@ import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 
 import qualified Behavior.Internal.Alarm as Alarm
 import Behavior.Internal.Counter
+import qualified Behavior.Internal.Deadlock as Deadlock
 import Behavior.Internal.Seam
 import Behavior.Internal.Seconds
 import Behavior.Internal.Simulator
 
--- | A thread that the library has started, and how it ends.
-data Thread a = Thread
+-- | A thread that the library has started, and what it publishes as it ends.
+data Thread r = Thread
   { threadId :: {-# UNPACK #-} !ThreadId
-  , threadResult :: {-# UNPACK #-} !(TVar (Maybe (Either SomeException a)))
+  , threadResult :: {-# UNPACK #-} !(TVar (Maybe r))
   -- ^ Nothing until it has ended, cleanup included.
   }
 
--- | How the thread ends; retries until it has.
-threadEnd :: Thread a -> STM (Either SomeException a)
+-- | What the thread published; retries until it has ended.
+threadEnd :: Thread r -> STM r
 threadEnd thread = threadEndSoFar thread >>= maybe STM.retry pure
 
--- | How the thread has ended, if it has.
-threadEndSoFar :: Thread a -> STM (Maybe (Either SomeException a))
+-- | What the thread has published, if it has ended.
+threadEndSoFar :: Thread r -> STM (Maybe r)
 threadEndSoFar = STM.readTVar . threadResult
 
 -- | The same, at a glance.
-threadEndNow :: Thread a -> IO (Maybe (Either SomeException a))
+threadEndNow :: Thread r -> IO (Maybe r)
 threadEndNow = STM.readTVarIO . threadResult
 
 -- | Starts a thread in which the action runs unmasked, whatever the caller's
--- masking state. Call it masked, or the thread may be lost before it is returned.
-start :: Label -> IO a -> IO (Thread a)
-start = startThen (\_ -> pure ())
+-- masking state, and which publishes how that ended. Call it masked, or the thread may be
+-- lost before it is returned.
+start :: Label -> IO a -> IO (Thread (Either SomeException a))
+start = startWith pure (\_ -> pure ())
 {-# INLINE start #-}
 
--- | The same; as it is known how the thread has ended, the given is done in the same
--- transaction.
+-- | The same, but the thread publishes what the first function, which runs in it and masked,
+-- makes of how the action ended. The second function is done in the same transaction.
 --
 -- (What is inlined here, and what is not, is so that the switch costs nothing.)
-startThen :: (Either SomeException a -> STM ()) -> Label -> IO a -> IO (Thread a)
-startThen then' label act = inSimulation (startReally then' label act) (startSimulated then' label act)
-{-# INLINE startThen #-}
+startWith :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
+startWith finish hook label act = inSimulation (startReally finish hook label act) (startSimulated finish hook label act)
+{-# INLINE startWith #-}
 
-startReally :: (Either SomeException a -> STM ()) -> Label -> IO a -> IO (Thread a)
-startReally then' label act = do
+startReally :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
+startReally finish hook label act = do
   result <- STM.newTVarIO Nothing
   add threads 1
   -- Forked masked: an exception cannot strike before 'try' is in place, nor
   -- between the end of the action and the publication of how it ended.
   thread <- forkIOWithUnmask $ \unmask -> do
-    end <- life tell label (unmask act)
-    STM.atomically (STM.writeTVar result (Just end) >> then' end)
+    end <- life tell label (unmask act) >>= finish
+    STM.atomically (STM.writeTVar result (Just end) >> hook end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
 
-startSimulated :: (Either SomeException a -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread a)
-startSimulated then' label act simulation = do
+startSimulated :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread r)
+startSimulated finish hook label act simulation = do
   result <- STM.newTVarIO Nothing
   let report event = tell event >> record simulation event
-  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> act))) $ \end ->
-    STM.writeTVar result (Just end) >> then' end
+  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> act)) >>= finish) $ \end ->
+    STM.writeTVar result (Just end) >> hook end
   add threads 1
   pure (Thread thread result)
 {-# NOINLINE startSimulated #-}
@@ -219,13 +222,23 @@ unlessAtAGlance glance waiting = inSimulation twice (const (pure Nothing)) >>= m
  where
   twice = glance >>= maybe (yield >> glance) (pure . Just)
 
--- | A wait that nothing can interrupt; for the end of threads that were asked to stop.
--- GHC's deadlock detector is not heeded: it takes a thread that waits for a cleanup which
--- itself was just woken by the detector for deadlocked too.
+-- | A wait that nothing can interrupt. GHC's deadlock detector is not heeded: it takes a
+-- thread that waits for a cleanup which itself was just woken by the detector for deadlocked
+-- too.
 firmly :: IO a -> IO a
 firmly waiting = uninterruptibleMask_ again
  where
   again = try waiting >>= either (\BlockedIndefinitelyOnSTM -> again) pure
+
+-- | Waits, uninterruptibly, for a transaction that comes when these threads have ended; but
+-- not for a thread that waits until the caller has received an exception. What the caller has
+-- received so is given too, the latest first. Call it masked.
+--
+-- (In a simulation no thread waits so: what is thrown goes by the seam, or is reported.)
+awaitUninterruptibly :: [ThreadId] -> STM a -> IO ([SomeException], a)
+awaitUninterruptibly threads' transaction =
+  inSimulation (Deadlock.awaitUnlessAwaited threads' transaction) $ \simulation ->
+    (,) [] <$> firmly (transact simulation transaction)
 
 -- | A moment at which the others may run, and a cancellation that is under way
 -- arrives, if the masking state allows it.

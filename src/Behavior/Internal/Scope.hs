@@ -10,8 +10,11 @@
 -- 1. What was started has ended, cleanup included, before the operator returns or
 --    throws; nothing orphans it, not even a second cancellation.
 -- 2. What has to stop is asked all at once, then waited for.
--- 3. The outcome is the first that there is of: the caller's cancellation, the
---    leftmost fault, the operator's verdict.
+-- 3. The outcome is the first that there is of: what was thrown at the caller from
+--    outside, the leftmost fault, the operator's verdict.
+--
+-- Users' code runs in branches, or where an operator catches what it throws. So an exception
+-- that reaches 'structured' was thrown at the caller from outside, whatever its type.
 module Behavior.Internal.Scope
   ( -- * Scopes
     Scope
@@ -27,7 +30,6 @@ module Behavior.Internal.Scope
   , branch
   , branchThen
   , worker
-  , successor
   , forget
   , ask
   , askWithoutWaiting
@@ -40,26 +42,32 @@ module Behavior.Internal.Scope
   , StoppedWithFault (..)
   ) where
 
-import Control.Concurrent (ThreadId)
+import Control.Concurrent (ThreadId, myThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception
   ( Exception (..)
+  , MaskingState (..)
+  , SomeAsyncException (..)
   , SomeException (..)
   , asyncExceptionFromException
   , asyncExceptionToException
   , catch
+  , evaluate
+  , getMaskingState
   , mask
   , mask_
   , onException
   , throwIO
   , try
-  , uninterruptibleMask_
   )
 import Control.Monad (foldM, when)
+import Data.Either (isLeft)
+import Data.Foldable (for_)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
-import Behavior.Internal.Failure (isCancellation, isFailure)
+import Behavior.Internal.Deadlock (isDeadlock)
+import Behavior.Internal.Failure (BehaviorFailed (..), isFailure)
 import Behavior.Internal.Runtime
 
 -- | The branches that an operator has started, newest first. Only the operator's
@@ -68,7 +76,7 @@ newtype Scope = Scope (IORef [SomeBranch])
 
 -- | A behaviour that runs in a thread of its own on behalf of an operator.
 data Branch a = Branch
-  { branchThread :: {-# UNPACK #-} !(Thread a)
+  { branchThread :: {-# UNPACK #-} !(Thread (Outcome a))
   , branchAsked :: {-# UNPACK #-} !(IORef Bool)
   -- ^ Whether it was asked to stop: nobody is asked twice, for the second
   -- request would interrupt the cleanup that the first one began.
@@ -76,12 +84,12 @@ data Branch a = Branch
 
 -- | How the branch ended; retries until it has.
 outcome :: Branch a -> STM (Outcome a)
-outcome b = ending b <$> threadEnd (branchThread b)
+outcome = threadEnd . branchThread
 
 -- | How the branch ended, if it has. (To ask several branches so, one after the other, is
 -- the same as 'orElse' between their outcomes, without its nested transactions.)
 outcomeSoFar :: Branch a -> STM (Maybe (Outcome a))
-outcomeSoFar b = fmap (ending b) <$> threadEndSoFar (branchThread b)
+outcomeSoFar = threadEndSoFar . branchThread
 
 branchId :: Branch a -> ThreadId
 branchId = threadId . branchThread
@@ -103,58 +111,79 @@ data Outcome a
 -- | Lets the body start branches and come to a verdict (an action that returns or
 -- throws), stops what still runs, and gives the outcome.
 structured :: (Scope -> IO (IO a)) -> IO a
-structured body = mask $ \restore -> do
-  scope <- Scope <$> newIORef []
-  -- (As @body scope@ it would be a thunk first, in every operator.)
-  verdict <- try (restore (pure scope >>= body))
-  faults <- end scope
-  case (verdict, faults) of
-    (Left e, []) | isCancellation e -> throwIO e
-    (Left e, fault : _) | isCancellation e -> throwIO (StoppedWithFault e fault)
-    -- A cancellation that came while the branches were stopping arrives here, and
-    -- not when the outcome has been thrown into some handler of the caller's.
-    (_, []) -> restore checkpoint >> either throwIO id verdict
-    (_, fault : _) -> do
-      restore checkpoint `catch` \cancellation -> throwIO (StoppedWithFault cancellation fault)
-      throwIO fault
-
--- | Stops everything in the scope, and gives the faults from left to right.
-end :: Scope -> IO [SomeException]
-end (Scope branches) = do
-  newestFirst <- readIORef branches
-  -- Nothing may interrupt this, or the rest would be orphaned.
-  uninterruptibleMask_ (ask newestFirst)
-  reverse <$> foldM withFault [] (reverse newestFirst)
+structured body = do
+  state <- getMaskingState
+  mask $ \restore -> do
+    scope <- Scope <$> newIORef []
+    -- (As @body scope@ it would be a thunk first, in every operator.)
+    verdict <- try (restore (pure scope >>= body))
+    (thrown, faults) <- end scope state (either pure (const []) verdict)
+    deadlocked <- either isDeadlock (const (pure False)) verdict
+    case (if deadlocked then drop 1 thrown else thrown, faults) of
+      (first : others, _) | state == Unmasked || isLeft verdict -> do
+        throwLater others
+        throwIO (case faults of [] -> first; fault : _ -> toException (StoppedWithFault first fault))
+      (others, _) -> do
+        throwLater others
+        -- What was thrown at the caller while it could not be interrupted arrives here, and
+        -- not when the outcome has been thrown into some handler of the caller's.
+        case faults of
+          [] -> restore checkpoint >> either throwIO id verdict
+          fault : _ -> do
+            restore checkpoint `catch` \e -> throwIO (StoppedWithFault e fault)
+            throwIO fault
  where
-  withFault others (SomeBranch b) =
-    endedFirmly b >>= \case
-      Faulted e -> pure (e : others)
-      _ -> pure others
-  endedFirmly b = unlessAtAGlance (outcomeNow b) (firmly (atomically (outcome b)))
+  throwLater [] = pure ()
+  throwLater others = myThreadId >>= \self -> for_ others (\e -> interruptByMessengers (const e) [self])
+
+-- | Stops everything in the scope. Gives the faults from left to right, and what has been
+-- thrown at the caller, the first first: what had been before, or while this waits.
+--
+-- A caller that is not masked can be interrupted here as long as nothing was thrown at it (so
+-- a cleanup may throw to it). After that it cannot, or branches would be orphaned; what is
+-- thrown stays pending, in GHC's own queue, where it can be taken back. Neither can a caller
+-- that is masked: it must not lose the verdict.
+end :: Scope -> MaskingState -> [SomeException] -> IO ([SomeException], [SomeException])
+end (Scope branches) state before = do
+  newestFirst <- readIORef branches
+  (more, ()) <- once before (ask newestFirst) ((,) [] <$> askWithoutWaiting newestFirst)
+  (thrown, faults) <- foldM (withFault (map idOf newestFirst)) (more ++ before, []) (reverse newestFirst)
+  pure (reverse thrown, reverse faults)
+ where
+  idOf (SomeBranch b) = branchId b
+  withFault threads' (thrown, faults) (SomeBranch b) = do
+    (more, o) <-
+      unlessAtAGlance (fmap ((,) []) <$> outcomeNow b) $
+        once thrown (atomically (outcome b)) (awaitUninterruptibly threads' (outcome b))
+    let thrown' = more ++ thrown
+    pure $! case o of
+      Faulted e -> (thrown', e : faults)
+      _ -> (thrown', faults)
+  -- The first can be interrupted; then the second is done.
+  once thrown interruptibly uninterruptibly
+    | state == Unmasked, null thrown =
+        try interruptibly >>= \case
+          Right a -> pure ([], a)
+          Left e -> do
+            deadlocked <- isDeadlock e
+            (more, a) <- uninterruptibly
+            pure (if deadlocked then more else more ++ [e], a)
+    | otherwise = uninterruptibly
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
 branch = branchThen (\_ -> pure ())
 
--- | The same; as it is known how the branch has ended, the given is done in the same
--- transaction. (It is told that it completed, or what it threw.)
-branchThen :: (Either SomeException a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
-branchThen then' scope label act = launch scope (\_ -> startThen then' label act)
+-- | The same; in the transaction that publishes how the branch ended, the given is done too.
+branchThen :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
+branchThen hook scope label act = launch scope (\_ -> startWith classified hook label act)
 
 -- | Starts a branch that can see whether it was asked to stop. One that runs a
 -- user's action in a loop must look: the action may have swallowed the request.
 worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-worker scope label act = launch scope (start label . act)
+worker scope label act = launch scope (startWith classified (\_ -> pure ()) label . act)
 
--- | Starts a worker that goes on for a branch that has ended, in its place: what is
--- left and right of it stays so.
-successor :: Scope -> Branch b -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-successor scope@(Scope branches) old label act = mask_ $ do
-  new <- worker scope label act
-  modifyIORef' branches (instead old [SomeBranch new] . drop 1)
-  pure new
-
-launch :: Scope -> (IO Bool -> IO (Thread a)) -> IO (Branch a)
+launch :: Scope -> (IO Bool -> IO (Thread (Outcome a))) -> IO (Branch a)
 launch (Scope branches) starting = mask_ $ do
   asked <- newIORef False
   thread <- starting (readIORef asked)
@@ -165,16 +194,12 @@ launch (Scope branches) starting = mask_ $ do
 -- | Takes a branch that has ended, and did not fault, out of the scope, which
 -- otherwise would grow with every branch that an operator ever started.
 forget :: Scope -> Branch a -> IO ()
-forget (Scope branches) old = modifyIORef' branches (instead old [])
-
--- | The branches, with these in place of one.
-instead :: Branch a -> [SomeBranch] -> [SomeBranch] -> [SomeBranch]
-instead old new = without
+forget (Scope branches) old = modifyIORef' branches without
  where
   -- Strict: an unevaluated list would hold on to what was taken out of it.
   without [] = []
   without (SomeBranch b : others)
-    | branchId b == branchId old = new ++ others
+    | branchId b == branchId old = others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
 -- | Asks branches (the newest first) to stop, all at once: none hears it later because
@@ -223,7 +248,7 @@ ended b = unlessAtAGlance (outcomeNow b) (atomically (outcome b))
 
 -- | How the branch has ended, if it has, at a glance.
 outcomeNow :: Branch a -> IO (Maybe (Outcome a))
-outcomeNow b = fmap (ending b) <$> threadEndNow (branchThread b)
+outcomeNow = threadEndNow . branchThread
 
 -- | What the branch has returned, if it has.
 completedNow :: Branch a -> IO (Maybe a)
@@ -241,17 +266,30 @@ result = \case
   Faulted e -> Left e
   Stopped e -> Left e
 
--- | How a branch ended whose thread ended so.
-ending :: Branch a -> Either SomeException a -> Outcome a
-ending b = \case
-  Right a -> Completed a
-  Left e
-    | isOwnStop e -> Stopped e
-    | Just (StoppedWithFault cause fault) <- fromException e, isOwnStop cause -> Faulted fault
-    | isFailure e -> Failing e
-    | otherwise -> Faulted e
+-- | How a branch ended whose action ended so. It is called in the branch's own thread: an
+-- exception may itself be undefined, and to look at it throws, which must happen to no
+-- operator that still has branches. What that throws is the fault.
+classified :: Either SomeException a -> IO (Outcome a)
+classified = \case
+  Right a -> pure (Completed a)
+  Left e -> do
+    self <- myThreadId
+    try (evaluate (kind self (forced e))) >>= either (fmap Faulted . defined) pure
  where
-  isOwnStop cause = fromException cause == Just (stopping b)
+  kind self e
+    | isStopOf self e = Stopped e
+    | Just (StoppedWithFault cause fault) <- fromException e, isStopOf self cause = Faulted $! forced fault
+    | isFailure e = Failing e
+    | otherwise = Faulted e
+  isStopOf self cause = fromException cause == Just (Stop self)
+  defined e = try (evaluate (forced e)) >>= either defined pure
+
+-- | The exception; all that handlers match on is evaluated with it.
+forced :: SomeException -> SomeException
+forced e@(SomeException inner)
+  | Just (BehaviorFailed failure) <- fromException e = failure `seq` e
+  | Just (SomeAsyncException cancellation) <- fromException e = cancellation `seq` e
+  | otherwise = inner `seq` e
 
 -- | How an operator asks a branch to stop. It names the thread it is meant for: a
 -- request that strays into another thread is not mistaken for that one's own.
@@ -275,9 +313,9 @@ instance Exception Stop where
 --
 -- @since 0.1.0.0
 data StoppedWithFault = StoppedWithFault
-  { stoppedBy :: SomeException
+  { stoppedBy :: !SomeException
   -- ^ The cancellation.
-  , stoppedFault :: SomeException
+  , stoppedFault :: !SomeException
   -- ^ The leftmost fault of the behaviours that it stopped.
   }
 
