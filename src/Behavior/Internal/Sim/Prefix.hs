@@ -35,13 +35,15 @@ data Choices
 emptyPrefix :: Int -> Prefix
 emptyPrefix preemptions = Prefix preemptions NoChoice
 
--- | The earliest first.
+-- | The choices, the earliest first: the number of a scheduling point, and of the thread
+-- that runs there.
 choices :: Prefix -> [(Int, Int)]
 choices (Prefix _ latestFirst) = go [] latestFirst
  where
   go later NoChoice = later
   go later (Choice p thread before) = go ((p, thread) : later) before
 
+-- | How many choices there are.
 choiceCount :: Prefix -> Int
 choiceCount = length . choices
 
