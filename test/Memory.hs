@@ -7,6 +7,7 @@
 module Memory
   ( inConstantMemory
   , growingByLessThan
+  , liveBytes
   ) where
 
 import Control.Monad (when)
@@ -38,6 +39,7 @@ growingByLessThan bytes steps act = do
     (Just atFirst, Just atLast) -> atLast - atFirst `shouldSatisfy` (< bytes)
     _ -> expectationFailure "there were fewer steps than it should have made"
 
+-- | What is live after a major garbage collection.
 liveBytes :: IO Int64
 liveBytes = do
   performMajorGC

@@ -36,6 +36,7 @@ import qualified Promises.PromisesSimSpec
 import qualified SemanticsSpec
 import qualified Sim.DeliverySpec
 import qualified Sim.EndSpec
+import qualified Sim.ExploreSpaceSpec
 import qualified Sim.ExploreSpec
 import qualified Sim.MockSpec
 import qualified Sim.QuickCheckSpec
@@ -78,6 +79,7 @@ main = hspec $ do
     Sim.DeliverySpec.spec
     Sim.EndSpec.spec
     Sim.SlipSpec.spec
+    Sim.ExploreSpaceSpec.spec
     Sim.ExploreSpec.spec
     Sim.RecordSpec.spec
     Sim.MockSpec.spec

@@ -8,6 +8,7 @@ module Measured
   , time
   , processorTime
   , residentBytes
+  , peakResidentBytes
   , quantile
 
     -- * Waiting for many
@@ -44,6 +45,12 @@ residentBytes :: IO Double
 residentBytes = do
   sizes <- words <$> readFile "/proc/self/statm"
   evaluate (4096 * read (sizes !! 1))
+
+-- | The most that the process has had in memory.
+peakResidentBytes :: IO Double
+peakResidentBytes = do
+  status <- map words . lines <$> readFile "/proc/self/status"
+  evaluate (sum [1024 * read kilobytes | "VmHWM:" : kilobytes : _ <- status])
 
 -- | The value that this part of the sorted samples does not exceed.
 quantile :: Double -> [Double] -> Double

@@ -1,10 +1,16 @@
 -- |
--- How fast the simulator is: one round, a line for each figure.
+-- How fast the simulator is: one round, a line for each figure. With @memory random@ or
+-- @memory exhaustive@: how much memory an exploration of a million schedules takes.
 module Main (main) where
 
 import Control.Concurrent (runInUnboundThread)
 import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
-import Control.Monad (forM_)
+import Control.Monad (forM_, void, when)
+import Data.IORef (atomicModifyIORef', modifyIORef', newIORef, readIORef)
+import GHC.Stats (gc, gcdetails_live_bytes, getRTSStats)
+import System.Environment (getArgs)
+import System.Exit (die)
+import System.Mem (performMajorGC)
 
 import Behavior
 import qualified Behavior.Signal as Signal
@@ -14,6 +20,17 @@ import Measured
 
 main :: IO ()
 main = runInUnboundThread $ do
+  arguments <- getArgs
+  case arguments of
+    [] -> speed
+    ["memory", "random"] -> memory "random" (randomly most)
+    ["memory", "exhaustive"] -> memory "exhaustive" (exhaustively 5) {search = Exhaustive 5 most}
+    _ -> die "usage: simulation [memory (random | exhaustive)]"
+ where
+  most = 1000000
+
+speed :: IO ()
+speed = do
   perSecond "scheduling points, two threads in turn" $ do
     turn <- newTVarIO True
     let player mine = forM_ [1 .. 100000 :: Int] $ \_ ->
@@ -32,11 +49,31 @@ main = runInUnboundThread $ do
   scheduledBy seed = simulateWith defaults {scheduled = Seeded seed} mission
   aDay = Signal.monitor ((< 0) <$> Signal.polling 1 (pure (1 :: Int))) (pure ()) (forM_ [1 .. 1000 :: Int] (const (sleep 86.4)))
 
+-- | What is live after 20,000 schedules and after 200,000, and the most that the process had.
+memory :: String -> Plan -> IO ()
+memory name plan = do
+  tried <- newIORef (0 :: Int)
+  measured <- newIORef []
+  void . explore plan $ \simulated -> do
+    n <- atomicModifyIORef' tried (\n -> (n + 1, n))
+    when (n `elem` [20000, 200000]) $ do
+      performMajorGC
+      live <- gcdetails_live_bytes . gc <$> getRTSStats
+      modifyIORef' measured ((n, live) :)
+    void (simulated (missionWith (Signal.debounce 0.5)))
+  -- Only now: to print takes memory, too.
+  readIORef measured >>= mapM_ (\(n, live) -> line (name ++ " schedules, live " ++ show n) (fromIntegral live))
+  line (name ++ " schedules, resident") =<< peakResidentBytes
+
 -- | A battery that gets low twice, under a limit of time.
 mission :: Behavior ()
-mission = do
+mission = missionWith id
+
+-- | Its signal may be refined.
+missionWith :: (Signal.Signal Bool -> Signal.Signal Bool) -> Behavior ()
+missionWith refined = do
   battery <- newTVarIO (20 :: Int)
-  let low = (< 10) <$> Signal.watching (readTVar battery)
+  let low = refined ((< 10) <$> Signal.watching (readTVar battery))
       use n = atomically (readTVar battery >>= \b -> writeTVar battery (b - n))
       recharge = sleep 1 >> atomically (writeTVar battery 100)
   Signal.monitor low recharge (sleep 1 >> use 15 >> sleep 1) ||| sleep 10

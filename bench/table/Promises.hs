@@ -12,7 +12,7 @@ promises :: [Group]
 promises =
   [trying, together, reacting, manyBranches, rules, standingStill, longPrograms]
     ++ [reactions, besideComputation, idleFleet, fleetBytes, fleetTime]
-    ++ [seamTime, seamBytes, simulator, simulatedDay]
+    ++ [seamTime, seamBytes, simulator, simulatedDay, explorations]
 
 -- What the operators cost, beside what does the same by hand, or as behaviour trees do it.
 
@@ -174,6 +174,19 @@ simulatedDay =
     "A simulated day, a sensor at 1 Hz and a thousand actions: seconds"
     "-N1 -A16m -ki2k"
     ["a simulated day" `atMost` 0.5]
+
+-- What a search of schedules keeps in memory does not grow with their number.
+
+explorations :: Group
+explorations =
+  Group "A million schedules: bytes" "-N1 -A16m -ki2k" $
+    concat
+      [ [ schedulesOf "live 200000" `within` 1.1 `times` schedulesOf "live 20000"
+        , schedulesOf "resident" `atMost` 200 * million
+        ]
+      | searching <- ["random", "exhaustive"]
+      , let schedulesOf what = fromString (searching ++ " schedules, " ++ what)
+      ]
 
 -- | The measurement of this for so many branches, rules or agents.
 of' :: String -> Double -> Figure

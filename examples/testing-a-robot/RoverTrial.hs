@@ -5,9 +5,16 @@ module RoverTrial
   , well
   , wholeMission
   , wayHome
+  , asHspec
+  , charged
+  , motorOnly
   ) where
 
+import Control.Exception (SomeException (..), displayException)
 import Control.Monad ((>=>))
+import Data.Typeable (cast)
+import Test.HUnit.Lang (HUnitFailure (..), formatFailureReason)
+import Test.Hspec (shouldBe)
 
 import Behavior
 import Behavior.Sim
@@ -58,3 +65,18 @@ wayHome :: (Rover -> Behavior ()) -> Plan -> IO Report
 wayHome home plan =
   explore plan $ \simulated ->
     trial (\rover -> untilButton rover (home rover)) [(0, True)] (simulated >=> well)
+
+-- | Shows a failed expectation as hspec prints it.
+asHspec :: SomeException -> String
+asHspec (SomeException e) = case cast e of
+  Just (HUnitFailure _ reason) -> formatFailureReason reason
+  Nothing -> displayException e
+
+-- | At this time the rover is home and charged, if nobody presses the button.
+charged :: Seconds -> Plan -> IO Report
+charged time plan =
+  explore plan {showException = asHspec} $ \simulated ->
+    trial goHome [(0, False)] (simulated >=> \run -> finished run `shouldBe` time)
+
+motorOnly :: Plan
+motorOnly = (exhaustively 0) {selectSteps = mentioning ["motor runs"]}

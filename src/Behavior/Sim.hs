@@ -89,6 +89,8 @@ module Behavior.Sim
   , Did (..)
   , Label (..)
   , narrate
+  , ofThreads
+  , mentioning
 
     -- * Many runs
   , explore
@@ -101,9 +103,11 @@ module Behavior.Sim
   , endingAt
   , Report (..)
   , Counterexample (..)
+  , renderSchedule
   ) where
 
 import Behavior.Internal.Sim.Explore
+import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types

@@ -2,7 +2,7 @@
 -- The tutorial "Testing a robot": what it shows is what there is, and what happens.
 module Examples.TestingARobotSpec (spec) where
 
-import Control.Exception (try)
+import Control.Exception (throwIO, try)
 import Control.Monad (unless, (>=>))
 import Data.Foldable (for_)
 import Data.List (isInfixOf, isPrefixOf, tails)
@@ -29,6 +29,16 @@ spec = guarded $ do
       again <- try (wayHome goHomeAtFirst (replaying (either failing (const Undisturbed) found)))
       either (show . because) show again `shouldBe` either (show . because) show found
       either (length . story) (const 0) again `shouldBe` either (length . story) (const (-1)) found
+  describe "A failed expectation of hspec" $ do
+    it "reads as hspec prints it, as the page says" $
+      charged 20 (exhaustively 0) `failsAs` 5
+    it "comes with fewer steps, if they are narrowed, as the page says" $
+      charged 20 motorOnly `failsAs` 6
+    it "of any kind reads as hspec prints it" $ do
+      let shown expectation = either asHspec (const "it held") <$> try expectation
+      shown ((1 :: Int) `shouldBe` 2) `shouldReturn` "expected: 2\n but got: 1"
+      shown (expectationFailure "no") `shouldReturn` "no"
+      shown (throwIO (userError "x") :: Expectation) `shouldReturn` "user error (x)"
   describe "The page" $ do
     it "shows the modules' own text" $ do
       modules <- traverse (fmap lines . readFile) sources
@@ -37,7 +47,7 @@ spec = guarded $ do
       for_ shown $ \block -> block `shouldSatisfy` \text -> any (text `isInfixOf`) modules
     it "shows what exploring the mended version says" $ do
       said <- traverse (fmap show) [wholeMission goHome (randomly 1000), wayHome goHome (exhaustively 2)]
-      shown <- drop 2 <$> blocks "text"
+      shown <- take 2 . drop 2 <$> blocks "text"
       concat shown `shouldBe` said
  where
   sources =

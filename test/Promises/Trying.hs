@@ -72,7 +72,7 @@ underAll from preemptions limit n language (Promise name gen keeping) =
 
 tried :: String -> Search -> (Stage -> IO ()) -> IO Tried
 tried program how keeping =
-  exploring (Plan how limits) (keeping . simulated) >>= \case
+  exploring (randomly 1) {search = how, under = limits} (keeping . simulated) >>= \case
     Left counterexample -> broken ("of this program:\n" ++ program ++ "\n" ++ show counterexample)
     Right report
       | complete report -> pure (Tried 1 (schedules report) (pointsInAll report))
@@ -127,7 +127,7 @@ firstRejection limit seed language (Promise _ gen keeping) = go 1
     | otherwise = do
         let program = programFrom (gen Full) (seed * 1000003 + i)
         rejected <- newIORef False
-        _ <- exploring (Plan (Random 1 (seed * 1000003 + i)) limits) $ \simulating ->
+        _ <- exploring (randomly 1) {search = Random 1 (seed * 1000003 + i), under = limits} $ \simulating ->
           keeping (simulated simulating) language program
             `catch` \(Broken _) -> writeIORef rejected True
         yes <- readIORef rejected

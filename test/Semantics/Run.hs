@@ -51,6 +51,7 @@ import Behavior.Sim
   , Search (Exhaustive)
   , Step (at, did, label)
   , defaults
+  , exhaustively
   , explore
   , simulateWith
   )
@@ -69,7 +70,7 @@ observed how world = observing (simulateWith (limits world) {scheduled = how}) w
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
-  report <- explore (Plan (Exhaustive preemptions most) (limits world)) $ \simulated ->
+  report <- explore (exhaustively preemptions) {search = Exhaustive preemptions most, under = limits world} $ \simulated ->
     observing simulated world >>= \seen -> modifyIORef' found (Set.insert seen)
   found' <- readIORef found
   pure (found', complete report)

@@ -6,11 +6,12 @@ import Control.Concurrent.STM (modifyTVar', newTVarIO, readTVar, readTVarIO, ret
 import Control.Exception hiding (Deadlock)
 import Control.Monad (unless, void, when)
 import Data.IORef
-import Data.List (isInfixOf, nub, sort)
+import Data.List (isInfixOf, isPrefixOf, nub, sort)
 import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Internal.Runtime (note)
+import Behavior.Parallel (allOf)
 import Behavior.Sim
 import Behavior.Time (atomically, checkpoint)
 import Support hiding (note)
@@ -48,7 +49,7 @@ random = do
   it "is the same for the same seed, and another for another" $ do
     let from seed = do
           seen <- newIORef []
-          _ <- explore (Plan (Random 20 seed) defaults) $ \run -> do
+          _ <- explore (randomly 20) {search = Random 20 seed} $ \run -> do
             made <- run (both (sleep 1) (both (sleep 1) (sleep 1)))
             modifyIORef seen (show (schedule made) :)
           readIORef seen
@@ -75,11 +76,18 @@ exhaustive = do
       modifyIORef seen (show (schedule made) :)
     all' <- readIORef seen
     length (nub all') `shouldBe` length all'
+  it "tries the alternatives of the latest decision first, by the numbers of the threads" $ do
+    seen <- newIORef []
+    _ <- explore (exhaustively 0) $ \run -> do
+      made <- run (void (allOf [checkpoint, checkpoint, checkpoint]))
+      modifyIORef seen (schedule made :)
+    take 6 . reverse <$> readIORef seen
+      `shouldReturn` map Switching [[], [(13, 3)], [(9, 3)], [(8, 2)], [(8, 2), (12, 3)], [(8, 3)]]
   it "finds nothing with fewer pre-emptions than a defect needs" $ do
     let undisturbed k = either (const False) complete <$> exploring (exhaustively k) (counting 2)
     (,) <$> undisturbed 0 <*> undisturbed 1 `shouldReturn` (True, False)
   it "says so when there are more schedules than it may run" $ do
-    report <- explore (Plan (Exhaustive 3 50) defaults) $ \run -> void (run (both (sleep 1) (sleep 1)))
+    report <- explore (exhaustively 3) {search = Exhaustive 3 50} $ \run -> void (run (both (sleep 1) (sleep 1)))
     (schedules report, complete report) `shouldBe` (50, False)
 
 counterexample :: Spec
@@ -106,9 +114,53 @@ counterexample = do
         show c `shouldContain` "shrunk to one switch"
         [words line | line <- lines (show c), "saw" `isInfixOf` line]
           `shouldBe` [ ["0.000", "s", "1", "both:", "left", "saw", "0"]
-                     , ["0.000", "s", "3", "both:", "left", "saw", "0"]
+                     , ["0.000", "s", "3", "both:", "left", "(of", "2)", "saw", "0"]
                      ]
       Right _ -> expectationFailure "it should have been found"
+  it "shows what the property threw as the plan says" $ do
+    found <- exploring (randomly 1000) {showException = const "not two"} (counting 2)
+    take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one switch, this happens:"]
+  it "shows what did not happen again as the plan says" $ do
+    runs <- newIORef (0 :: Int)
+    found <- exploring (randomly 1) {showException = maybe "another" (\(Fault what') -> "fault " ++ what') . fromException} $ \run -> do
+      n <- atomicModifyIORef' runs (\n -> (n + 1, n))
+      _ <- run (pure ())
+      when (n == 0) (throwIO (Fault "once"))
+    either (show . because) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
+  it "shows only the steps that the plan selects, and how many" $ do
+    found <- exploring (randomly 1000) {selectSteps = mentioning ["saw"]} (counting 2)
+    (drop 2 . lines <$> either (Just . show) (const Nothing) found)
+      `shouldBe` Just
+        [ "shrunk to one switch, this happens (2 of 21 steps):"
+        , "     0.000 s  1 both: left         saw 0"
+        , "     0.000 s  3 both: left (of 2)  saw 0"
+        , "to see it again: explore (replaying (Switching [(5,2)]))"
+        ]
+  it "has the steps of some threads" $ do
+    run <- simulate (both (sleep 1) (both (sleep 1) (sleep 1)))
+    map number (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
+  it "has the steps in which a name occurs, in a label or in what was done" $ do
+    run <- simulate (both (note "a") (note "left"))
+    [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Says "a"), (1, Ends), (2, Says "left")]
+  it "tells the branches of two operators apart" $ do
+    run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
+    lines (narrate (mentioning ["starts", "asks"] (steps run)))
+      `shouldBe` [ "     0.000 s  1 both: left              starts"
+                 , "     0.000 s  2 both: right             starts"
+                 , "     0.000 s  3 parallel: left (of 1)   starts"
+                 , "     0.000 s  4 parallel: right (of 1)  starts"
+                 , "     0.000 s  5 parallel: left (of 2)   starts"
+                 , "     0.000 s  6 parallel: right (of 2)  starts"
+                 , "     1.000 s  1 both: left              asks 4 parallel: right to stop"
+                 , "     3.000 s  2 both: right             asks 6 parallel: right to stop"
+                 ]
+    map parentNumber (take 2 (steps run)) `shouldBe` [-1, 0]
+  it "is found from a schedule that fails, by schedules with fewer switches" $ do
+    let first = Seeded 18 -- the eighteenth of those that seed 0 tries
+    found <- exploring (replaying first) {search = Shrink first} (counting 2)
+    either failing (const first) found `shouldBe` Switching [(5, 2)]
+    held <- exploring (replaying Undisturbed) {search = Shrink Undisturbed} (counting 2)
+    either show (show . schedules) held `shouldBe` "1"
   it "of a deadlock tells who waited" $ do
     found <- exploring (randomly 100) $ \run -> do
       made <- run (both (pure ()) (atomically retry :: Behavior ()))
@@ -135,7 +187,7 @@ properties = do
     found <- exploring (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
     either (show . because) show found `shouldBe` "explore: a property simulates only once"
   it "is told of a run that is none" $ do
-    found <- exploring (Plan (Random 1 0) defaults {patience = 0.1}) $ \run ->
+    found <- exploring (randomly 1) {under = defaults {patience = 0.1}} $ \run ->
       void (run (mapM_ (evaluate . length . show) [0 :: Int ..]))
     either (show . because) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
   it "that throws a cancellation ends the exploration" $ do

@@ -1,29 +1,23 @@
+{-# LANGUAGE BangPatterns #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- Many schedules of one behaviour.
 module Behavior.Internal.Sim.Explore
-  ( Plan (..)
-  , Search (..)
-  , randomly
-  , exhaustively
-  , replaying
-  , endingAt
-  , explore
+  ( explore
   , exploring
-  , Report (..)
-  , Counterexample (..)
   ) where
 
 import Control.Exception hiding (Deadlock)
-import Control.Monad (when)
+import Data.Foldable (toList, traverse_)
 import Data.IORef
-import Data.List (dropWhileEnd, intercalate)
 import Data.Maybe (fromMaybe)
+import qualified Data.Sequence as Seq
 
 import Behavior.Internal.Failure (Behavior, isCancellation)
-import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Policy
+import Behavior.Internal.Sim.Prefix
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
@@ -32,120 +26,12 @@ import Behavior.Internal.Sim.Types
 -- >>> import Behavior
 -- >>> import Behavior.Sim
 
--- | Which schedules to run, and how.
---
--- @since 0.1.0.0
-data Plan = Plan
-  { search :: Search
-  , under :: Options
-  -- ^ Its 'scheduled' is not looked at.
-  }
-
--- | Which schedules to run.
---
--- @since 0.1.0.0
-data Search
-  = -- | So many random ones, from this seed. Each has few pre-emptions or many.
-    Random Int Int
-  | -- | All with up to so many pre-emptions; but no more schedules than the second number.
-    Exhaustive Int Int
-  | -- | This one.
-    Replay Schedule
-  deriving (Eq, Show)
-
--- | So many random schedules: each has few pre-emptions or many, but mostly few.
---
--- > randomly n  =  Plan (Random n 0) defaults
---
--- @since 0.1.0.0
-randomly :: Int -> Plan
-randomly n = Plan (Random n 0) defaults
-
--- | All schedules with up to so many pre-emptions, if there are no more than a million:
--- for small behaviours. (To go on with another thread where one has to wait is no
--- pre-emption: such choices are all made.)
---
--- @since 0.1.0.0
-exhaustively :: Int -> Plan
-exhaustively k = Plan (Exhaustive k 1000000) defaults
-
--- | Only this schedule, told in detail: what a 'Counterexample' says, to see it again.
---
--- @since 0.1.0.0
-replaying :: Schedule -> Plan
-replaying s = Plan (Replay s) defaults {detailed = True}
-
--- | The same schedules, with an end: every run is stopped when the virtual time comes to
--- this ('endAt'), with 'OutOfTime'. For missions that have no end of their own.
---
--- >>> import Control.Monad (forever)
--- >>> report <- explore (randomly 100 `endingAt` 60) (\simulate -> () <$ simulate (forever (sleep 1)))
--- >>> schedules report
--- 100
---
--- @since 0.1.0.0
-endingAt :: Plan -> Seconds -> Plan
-endingAt plan end = plan {under = (under plan) {endAt = end}}
-
--- | What was explored.
---
--- @since 0.1.0.0
-data Report = Report
-  { schedules :: Int
-  -- ^ How many schedules were run.
-  , complete :: Bool
-  -- ^ Whether those were all that the plan asks for.
-  , pointsInAll :: Int
-  -- ^ How many scheduling points they had.
-  }
-  deriving (Eq)
-
-instance Show Report where
-  show r =
-    show (schedules r) ++ " schedules of " ++ show (pointsInAll r) ++ " points in all"
-      ++ (if complete r then "" else ", and there are more")
-
--- | A schedule under which the property does not hold.
---
--- Its text says what went wrong, what happened up to then, and how to replay it.
---
--- @since 0.1.0.0
-data Counterexample = Counterexample
-  { failing :: Schedule
-  , because :: SomeException
-  -- ^ What the property threw.
-  , story :: [Step]
-  -- ^ What happened, in detail.
-  , foundAfter :: Int
-  -- ^ How many schedules were run until one failed.
-  }
-
-instance Show Counterexample where
-  show c =
-    intercalate
-      "\n"
-      [ "schedule " ++ show (foundAfter c) ++ " fails:"
-      , indented (text (because c))
-      , "shrunk to " ++ counted (failing c) ++ ", this happens:"
-      , dropWhileEnd (== '\n') (narrate (story c))
-      , "to see it again: explore (replaying (" ++ show (failing c) ++ "))"
-      ]
-   where
-    indented = intercalate "\n" . map ("  " ++) . lines
-    counted = \case
-      Switching [] -> "the undisturbed schedule"
-      Switching [_] -> "one switch"
-      Switching several -> show (length several) ++ " switches"
-      other -> show other
-
-instance Exception Counterexample
-
 -- | What the property threw once, but not when the same schedule was run again.
-newtype Unrepeatable = Unrepeatable SomeException
+newtype Unrepeatable = Unrepeatable String
 
 instance Show Unrepeatable where
   show (Unrepeatable e) =
-    text e
+    e
       ++ "\nBut when the same schedule was run again, this did not happen. Something in it is not simulated: \
          \a clock, a random number, a thread of forkIO, what an earlier run left behind?"
 
@@ -196,20 +82,25 @@ explore plan property =
 -- @since 0.1.0.0
 exploring
   :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
-exploring (Plan how o) property = case how of
+exploring plan property = case search plan of
   Random n seed -> randomSearch n seed
   Exhaustive k limit -> fullSearch k limit
-  Replay s -> do
+  Replay s -> only s $ \e t ->
+    pure Counterexample {failing = s, because = e, story = happened t, foundAfter = 1, foundBy = plan}
+  Shrink s -> only s (reduced 1)
+ where
+  o = under plan
+  try' chooser' = attempting o chooser' property
+
+  only s onFailure = do
     t <- try' (policy s)
     case thrown t of
       Nothing -> pure (Right (Report 1 True (size t)))
-      Just e -> pure (Left (Counterexample s e (happened t) 1))
- where
-  try' chooser' = attempting o chooser' property
+      Just e -> Left <$> onFailure e t
 
   randomSearch n seed = go 1 0
    where
-    go i total
+    go i !total
       | i > n = pure (Right (Report n True total))
       | otherwise = do
           t <- try' (policy (Seeded (seed * 1000003 + i)))
@@ -217,51 +108,52 @@ exploring (Plan how o) property = case how of
             Nothing -> go (i + 1) (total + size t)
             Just e -> Left <$> reduced i e t
 
-  fullSearch k limit = go 0 0 [([], k)]
+  -- The queue is a stack: what it holds are the alternatives to the decisions of the
+  -- schedule that was tried last, and of those that this one continues.
+  fullSearch k limit = go 1 0 (emptyPrefix k) []
    where
-    go :: Int -> Int -> [Prefix] -> IO (Either Counterexample Report)
-    go n total [] = pure (Right (Report n True total))
-    go n total (prefix : others)
-      | n >= limit = pure (Right (Report n False total))
+    go :: Int -> Int -> Prefix -> [Alternatives] -> IO (Either Counterexample Report)
+    go n !total prefix others
+      | n > limit = pure (Right (Report (n - 1) False total))
       | otherwise = do
-          (t, further) <- branching prefix
-          case thrown t of
-            Nothing -> go (n + 1) (total + size t) (further ++ others)
-            Just e -> Left <$> reduced (n + 1) e t
+          (t, queue) <- branching prefix others
+          case (thrown t, nextPrefix queue) of
+            (Just e, _) -> Left <$> reduced n e t
+            (Nothing, Just (next, rest)) -> go (n + 1) (total + size t) next rest
+            (Nothing, Nothing) -> pure (Right (Report n True (total + size t)))
 
-  -- Runs the undisturbed schedule but for these exceptions; and which more there could
-  -- be, after them.
-  branching (switches', left) = do
-    found <- newIORef []
-    let tell d =
-          let cost = if canGoOn d then 1 else 0
-              further = [(switches' ++ [(decisionPoint d, c)], left - cost) | c <- candidates d, c /= usual d]
-           in when (cost <= left) (modifyIORef' found (further ++))
-    t <- try' (fully switches' tell)
-    (,) t <$> readIORef found
+  -- Runs the undisturbed schedule but for the choices of the prefix; and puts the
+  -- alternatives to the decisions after them in front of the queue.
+  branching prefix others = do
+    queue <- newIORef others
+    t <- try' . fully (choices prefix) $ \d -> traverse_ (\more -> modifyIORef' queue (more :)) (alternatives prefix d)
+    (,) t <$> readIORef queue
 
   reduced i e t = do
     (fewer, e') <- shrunk (switches t) e
     (fewest, e'') <- simplest fewer e'
     again <- attempting o {detailed = True} (switching True fewest) property
-    let why = fromMaybe (toException (Unrepeatable e'')) (thrown again)
-    pure Counterexample {failing = Switching fewest, because = why, story = happened again, foundAfter = i}
+    let why = fromMaybe (toException (Unrepeatable (showException plan e''))) (thrown again)
+    pure Counterexample {failing = Switching fewest, because = why, story = happened again, foundAfter = i, foundBy = plan}
 
   -- To leave out one switch moves what comes after it, so that the others may miss their
-  -- points. So it looks afresh, the schedules with the fewest switches first.
+  -- points. So it looks afresh, the schedules with the fewest switches first. What is
+  -- queued and can never be tried is left out: it could be much.
   simplest :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
-  simplest known why = go (2000 :: Int) [([], 2 :: Int)] []
+  simplest known why = go (2000 :: Int) (emptyPrefix 2) [] Seq.empty
    where
-    go budget [] later
-      | null later || budget <= 0 = pure (known, why)
-      | otherwise = go budget (reverse later) []
-    go budget (prefix : others) later
-      | budget <= 0 || length (fst prefix) >= length known = pure (known, why)
+    go budget prefix others later
+      | budget <= 0 || choiceCount prefix >= length known = pure (known, why)
       | otherwise = do
-          (t, further) <- branching prefix
+          (t, further) <- branching prefix []
           case thrown t of
-            Just e -> pure (fst prefix, e)
-            Nothing -> go (budget - 1) others (foldl (flip (:)) later further)
+            Just e -> pure (choices prefix, e)
+            Nothing -> continue (budget - 1) others (Seq.take budget (later <> Seq.fromList further))
+    continue budget others later = case nextPrefix others of
+      Just (prefix, rest) -> go budget prefix rest later
+      Nothing
+        | null later -> pure (known, why)
+        | otherwise -> continue budget (toList later) Seq.empty
 
   -- Leaves out halves, quarters... of the switches, as long as it still fails.
   shrunk :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
@@ -279,9 +171,6 @@ exploring (Plan how o) property = case how of
             Just e' | length (switches t) < length these -> go (budget - 1) (min chunk (length (switches t))) (switches t) e'
             _ -> attemptAll (budget - 1) chunk more these why
   without n these = [take i these ++ drop (i + n) these | i <- [0, n .. length these - 1]]
-
--- | Switches, and how many pre-emptions more there may be.
-type Prefix = ([(Int, Int)], Int)
 
 -- | Runs the property once.
 attempting :: Options -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial

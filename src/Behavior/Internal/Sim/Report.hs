@@ -5,12 +5,13 @@
 module Behavior.Internal.Sim.Report
   ( explain
   , narrate
-  , aside
+  , ofThreads
+  , mentioning
   , text
   ) where
 
 import Control.Exception (SomeException (..), displayException)
-import Data.List (groupBy, intercalate)
+import Data.List (groupBy, intercalate, isInfixOf)
 import Numeric (showFFloat)
 
 import Behavior.Internal.Seconds (Seconds (..))
@@ -73,7 +74,8 @@ instead = \case
     "for something that this library knows nothing of (threadDelay): \
     \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
 
--- | What happened, a line for each step (what repeats itself is told once).
+-- | What happened, a line for each step (what repeats itself is told once): the virtual
+-- time, the number and the label of the thread, and what it did.
 --
 -- >>> run <- simulate (parallel (sleep 1) (sleep 2))
 -- >>> putStr (narrate (steps run))
@@ -83,18 +85,57 @@ instead = \case
 --      1.000 s  2 parallel: right  is interrupted: Stop: the operator that started this behaviour no longer wants it
 --      1.000 s  2 parallel: right  ends
 --
+-- Of a branch within a branch, the number of the outer one is added. So the branches of two
+-- operators can be told apart, whatever their labels are:
+--
+-- >>> run <- simulate (parallel (parallel (sleep 1) (sleep 1)) (parallel (sleep 1) (sleep 1)))
+-- >>> putStr (narrate (take 6 (steps run)))
+--      0.000 s  1 parallel: left          starts
+--      0.000 s  2 parallel: right         starts
+--      0.000 s  3 parallel: left (of 1)   starts
+--      0.000 s  4 parallel: right (of 1)  starts
+--      0.000 s  5 parallel: left (of 2)   starts
+--      0.000 s  6 parallel: right (of 2)  starts
+--
 -- @since 0.1.0.0
 narrate :: [Step] -> String
 narrate made = unlines (concatMap (map line . take 1) (groupBy repeated made))
  where
   repeated s t = (at s, number s, did s) == (at t, number t, did t)
   line s =
-    padLeft 10 (seconds (at s)) ++ " s  " ++ padRight width (who' s) ++ "  " ++ aside (did s)
-  who' s = show (number s) ++ " " ++ show (label s)
-  width = maximum (0 : map (length . who') made)
+    padLeft 10 (seconds (at s)) ++ " s  " ++ padRight width (thread s) ++ "  " ++ aside (did s)
+  width = maximum (0 : map (length . thread) made)
   seconds (Seconds t) = showFFloat (Just 3) t ""
   padLeft n t = replicate (n - length t) ' ' ++ t
   padRight n t = t ++ replicate (n - length t) ' '
+
+-- | Its number, its label, and the branch that it is within.
+thread :: Step -> String
+thread s = show (number s) ++ " " ++ show (label s) ++ (if parentNumber s > 0 then " (of " ++ show (parentNumber s) ++ ")" else "")
+
+-- | Only the steps of the threads with these numbers.
+--
+-- >>> run <- simulate (parallel (sleep 1) (sleep 2))
+-- >>> putStr (narrate (ofThreads [1] (steps run)))
+--      0.000 s  1 parallel: left  starts
+--      1.000 s  1 parallel: left  ends
+--
+-- @since 0.1.0.0
+ofThreads :: [Int] -> [Step] -> [Step]
+ofThreads numbers = filter ((`elem` numbers) . number)
+
+-- | Only the steps in whose line one of these texts occurs: a part of a thread's label, or
+-- of what it did, such as the name of an action or a condition.
+--
+-- >>> run <- simulate (parallel (sleep 1) (sleep 2))
+-- >>> putStr (narrate (mentioning ["left", "interrupted"] (steps run)))
+--      0.000 s  1 parallel: left   starts
+--      1.000 s  1 parallel: left   ends
+--      1.000 s  2 parallel: right  is interrupted: Stop: the operator that started this behaviour no longer wants it
+--
+-- @since 0.1.0.0
+mentioning :: [String] -> [Step] -> [Step]
+mentioning texts = filter (\s -> any (`isInfixOf` (thread s ++ "  " ++ aside (did s))) texts)
 
 -- | What a thread did, in words.
 aside :: Did -> String
@@ -103,7 +144,7 @@ aside = \case
   Ends -> "ends"
   Says what' -> what'
   Hears e -> "is interrupted: " ++ e
-  Throws target -> "asks " ++ show target ++ " to stop"
+  Throws n target -> "asks " ++ show n ++ " " ++ show target ++ " to stop"
   Transacts -> "transaction"
   Sleeps (Seconds t)
     | isInfinite t -> "sleeps for ever"

@@ -67,7 +67,7 @@ simulation sim =
   -- One that has ended hears nothing.
   withTarget target act = do
     found <- Map.lookup target <$> readIORef (threads sim)
-    for_ found (detail sim . Throws . taskLabel)
+    for_ found (\there -> detail sim (Throws (taskNumber there) (taskLabel there)))
     operation sim Free
     me <- readIORef (current sim)
     for_ found (act me)

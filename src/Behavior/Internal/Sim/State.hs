@@ -206,7 +206,7 @@ noteStep sim what' = do
   me <- readIORef (current sim)
   t <- readIORef (time sim)
   n <- readIORef (counter sim)
-  modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) what' :)
+  modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) (parent me) what' :)
 
 -- | Likewise, if the record is to be detailed.
 detail :: Sim -> Did -> IO ()

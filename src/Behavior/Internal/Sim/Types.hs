@@ -153,6 +153,8 @@ data Step = Step
   , number :: !Int
   -- ^ The number of the thread, in the order in which they were started, from 0.
   , label :: !Label
+  , parentNumber :: !Int
+  -- ^ The number of the thread that started it; of the first thread it is -1.
   , did :: Did
   }
   deriving (Eq, Show)
@@ -167,7 +169,7 @@ data Did
   | -- | An exception arrived that another thread had thrown to it.
     Hears String
   | -- | The last four only in a detailed run. It throws an exception to this thread.
-    Throws Label
+    Throws Int Label
   | -- | It runs a transaction.
     Transacts
   | -- | It sleeps until then.

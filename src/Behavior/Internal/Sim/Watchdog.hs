@@ -45,7 +45,8 @@ watched n sim = bracket_ enter (change (\(sims, awake) -> ((Map.delete n sims, a
       void (mask_ (forkOn (here + 1) (patrol Map.empty 0)))
 
 change :: ((Map Int Sim, Bool) -> ((Map Int Sim, Bool), b)) -> IO b
-change = atomicModifyIORef' kennel
+-- (The map is forced: as a thunk it would keep the simulations that are over.)
+change f = atomicModifyIORef' kennel (\old -> case f old of new@((sims, _), _) -> sims `seq` new)
 
 -- | What was seen of a simulation.
 data Sight = Sight
@@ -69,7 +70,7 @@ patrol seen idle = do
       when go (patrol seen 0)
     else do
       sights <- Map.traverseWithKey (\n sim -> look sim (Map.lookup n seen)) sims
-      patrol sights (if Map.null sims then idle + 1 else 0)
+      patrol sights $! if Map.null sims then idle + 1 else 0 -- a thunk would keep them
 
 -- | Sleeps for five milliseconds. With the threaded runtime in the operating system:
 -- 'threadDelay' needs a thread of the runtime's own, which may never get its turn while

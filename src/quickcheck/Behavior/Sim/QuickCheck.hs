@@ -26,49 +26,132 @@ module Behavior.Sim.QuickCheck
   , duration
   ) where
 
-import Control.Exception (Exception (..), throwIO)
-import Control.Monad ((>=>))
-import Test.QuickCheck
+import Control.Exception (Exception (..), SomeAsyncException, throwIO)
+import Control.Monad (when)
+import Data.Foldable (for_)
+import Data.IORef
+import Data.Maybe (isJust)
+import Test.QuickCheck hiding (Property, Result, theException)
+import Test.QuickCheck.Gen.Unsafe (Capture (..), capture)
+import Test.QuickCheck.Property
+  ( Callback (PostFinalFailure)
+  , CallbackKind (Counterexample)
+  , Prop (..)
+  , Property (..)
+  , Result (..)
+  , Rose (..)
+  , ioRose
+  , reduceRose
+  , rejected
+  )
+import Test.QuickCheck.State (terminal)
+import Test.QuickCheck.Text (putLine)
 
 import Behavior (Behavior, Seconds)
-import Behavior.Sim
+import Behavior.Sim hiding (Counterexample (Counterexample))
+import qualified Behavior.Sim as Sim
 
--- | Holds if the property does under every schedule tried; each test tries one.
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Sim
+-- >>> import Test.QuickCheck
+
+-- | Runs a property under a schedule that QuickCheck draws, another for each test.
 --
--- What the property gives may be anything that QuickCheck can test; it may also throw. Then
--- the schedule is shrunk, and told as a 'Counterexample'.
+-- The property is given a function that simulates under that schedule, once. What it
+-- returns is anything that QuickCheck can test, and the verdict is that of QuickCheck: a
+-- discarded test is discarded, 'expectFailure' expects a failure, labels, tables and
+-- coverage are counted, and what is generated inside has the test's seed and size. It may
+-- also throw, as the expectations of test libraries do.
+--
+-- When it fails, the schedule is shrunk first, then what was generated inside, as long as
+-- the schedule fits; and 'counterexample' shows what happened. (What is generated around
+-- it is shrunk before either.)
+--
+-- >>> :{
+-- quickCheck . underSchedules $ \simulate -> do
+--   run <- simulate (parallel (sleep 1) (sleep 2))
+--   pure (collect (finished run) True)
+-- :}
+-- +++ OK, passed 100 tests (100% 1.0).
 --
 -- @since 0.1.0.0
 underSchedules :: Testable prop => ((Behavior a -> IO (Run a)) -> IO prop) -> Property
 underSchedules = underSchedulesOf 1
 
--- | 'underSchedules' that tries so many schedules for each test: of use when what is
--- generated around it is costly, or more interesting than the schedules.
+-- | 'underSchedules' that runs the given number of schedules for each test, at least 1: of
+-- use when what is generated around it is costly, or more interesting than the schedules.
+--
+-- A test is decided by one of them: the first that fails or is discarded, or else the last.
+-- Only its labels, tables and coverage count, so that their shares are still shares of tests.
 --
 -- @since 0.1.0.0
 underSchedulesOf :: Testable prop => Int -> ((Behavior a -> IO (Run a)) -> IO prop) -> Property
-underSchedulesOf n body =
-  -- The seed is not shrunk: the schedule is, and better.
-  forAllBlind chooseAny $ \seed -> ioProperty $ do
-    found <- exploring (Plan (Random n seed) defaults) (body >=> holds)
-    pure $ case found of
-      Left c -> counterexample (show c) False
-      Right _ -> property True
+underSchedulesOf n body
+  | n < 1 = errorWithoutStackTrace ("underSchedulesOf: at least 1 schedule for each test, and not " ++ show n)
+  | otherwise = again . MkProperty $ do
+      drawn <- vectorOf n anySchedule
+      Capture generated <- capture
+      let tested prop = unProp (generated (unProperty (property prop)))
+          underOne = underSchedule (fmap tested . body)
+      pure (MkProp (foldr1 orElse (map underOne drawn)))
 
--- | Throws if it does not.
-holds :: Testable prop => prop -> IO ()
-holds prop = do
-  result <- quickCheckWithResult stdArgs {chatty = False, maxSuccess = 1} prop
-  case result of
-    Failure {} -> throwIO (DoesNotHold (output result))
-    _ -> pure ()
+-- | The first if it does not succeed, and the second if it does.
+orElse :: Rose Result -> Rose Result -> Rose Result
+first `orElse` second = IORose $ do
+  decided@(MkRose result _) <- reduceRose first
+  if ok result == Just True then reduceRose second else pure decided
 
-newtype DoesNotHold = DoesNotHold String
+-- | The verdict under this schedule. If it is a failure, the first thing to try instead is
+-- the same under a simpler schedule; then come those that the property itself has to offer.
+underSchedule :: ((Behavior a -> IO (Run a)) -> IO (Rose Result)) -> Schedule -> Rose Result
+underSchedule body drawn = ioRose $ do
+  MkRose result smaller <- tried (Replay drawn)
+  pure (MkRose result ([IORose (tried (Shrink drawn)) | falsified result] ++ smaller))
+ where
+  tried how = do
+    latest <- newIORef (MkRose rejected [])
+    over <- newIORef Nothing
+    shown <- newIORef Nothing
+    -- The property may simulate again when it is shrunk, which is after the exploration.
+    let simulateBy explored act = maybe (explored act) (later act) =<< readIORef over
+        later act chosen = do
+          run <- simulateWith (under plan) {scheduled = chosen} act
+          -- What was shrunk need not fit the schedule.
+          when (isMisfit (outcome run)) discard
+          modifyIORef shown (fmap (\c -> c {story = steps run}))
+          pure run
+        plan = (replaying drawn) {search = how}
+    found <- exploring plan $ \explored -> do
+      rose@(MkRose result _) <- reduceRose (ioRose (body (simulateBy explored)))
+      writeIORef latest rose
+      for_ (theException result) $ \e -> when (isCancellation e) (throwIO e)
+      when (falsified result) (throwIO Falsified)
+    writeIORef over (Just (either failing (const drawn) found))
+    writeIORef shown (either Just (const Nothing) found)
+    readIORef latest >>= explained shown
+  isMisfit (Misfit _) = True
+  isMisfit _ = False
+  isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 
-instance Show DoesNotHold where
-  show (DoesNotHold text) = text
+-- | Adds to each failure what happened in the run that was made for it.
+explained :: IORef (Maybe Sim.Counterexample) -> Rose Result -> IO (Rose Result)
+explained shown rose = do
+  MkRose result smaller <- reduceRose rose
+  happened <- fmap renderSchedule <$> readIORef shown
+  let with said = result {callbacks = printing said : callbacks result, testCase = said : testCase result}
+  pure (MkRose (if falsified result then maybe result with happened else result) (map (IORose . explained shown) smaller))
+ where
+  printing said = PostFinalFailure Counterexample (\state _ -> putLine (terminal state) said)
 
-instance Exception DoesNotHold
+falsified :: Result -> Bool
+falsified result = ok result == Just False && expect result
+
+-- | Ends a run of the property within 'exploring', which takes it for a counterexample.
+data Falsified = Falsified
+  deriving (Show)
+
+instance Exception Falsified
 
 -- | Any random schedule.
 --

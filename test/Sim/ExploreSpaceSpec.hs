@@ -1,0 +1,63 @@
+-- |
+-- How much memory an exploration takes.
+module Sim.ExploreSpaceSpec (spec) where
+
+import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+import Control.Monad (void, when)
+import Data.Foldable (for_)
+import Data.IORef
+import Data.Int (Int64)
+import GHC.Stats (getRTSStatsEnabled)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Parallel (allOf)
+import qualified Behavior.Signal as Signal
+import Behavior.Sim
+import Behavior.Time (atomically, checkpoint)
+import Memory (liveBytes)
+import Support (guarded)
+
+spec :: Spec
+spec = guarded . describe "In constant memory run" $ do
+  it "five thousand random schedules" $ do
+    (early, late) <- liveAfter 500 5000 (randomly 5000) recharging
+    late - early `shouldSatisfy` (< 50000)
+
+  it "five thousand schedules of an exhaustive exploration" $ do
+    (early, late) <- liveAfter 500 5000 (exhaustively 4) {search = Exhaustive 4 5000} recharging
+    late - early `shouldSatisfy` (< 50000)
+
+  it "many schedules of many threads, of which the queue keeps only numbers" $ do
+    -- The first is before there is a queue: it is the queue itself that is small.
+    (early, late) <- liveAfter 1 200 (exhaustively 2) {search = Exhaustive 2 200} $
+      void (allOf (replicate 60 (checkpoint >> sleep 1)))
+    late - early `shouldSatisfy` (< 500000)
+
+-- | The bytes that are live at the beginning of these two of the schedules: within the
+-- simulation, for the watchdog forgets when there is none.
+--
+-- The watchdog may just be looking at a simulation that is over. So each is the least of
+-- ten, one for each of the schedules before.
+liveAfter :: Int -> Int -> Plan -> Behavior a -> IO (Int64, Int64)
+liveAfter first second plan behavior = do
+  getRTSStatsEnabled `shouldReturn` True
+  tried <- newIORef (0 :: Int)
+  early <- newIORef maxBound
+  late <- newIORef maxBound
+  void . explore plan $ \run -> do
+    n <- atomicModifyIORef' tried (\n -> (n + 1, n + 1))
+    void . run $ do
+      for_ [(first, early), (second, late)] $ \(here, least) ->
+        when (n > here - 10 && n <= here) $ liveBytes >>= modifyIORef' least . min
+      behavior
+  (,) <$> readIORef early <*> readIORef late
+
+-- | A battery gets low once, and for longer than a moment.
+recharging :: Behavior ()
+recharging = do
+  battery <- newTVarIO (20 :: Int)
+  let low = Signal.debounce 0.5 ((< 10) <$> Signal.watching (readTVar battery))
+      use n = atomically (readTVar battery >>= \b -> writeTVar battery (b - n))
+      recharge = sleep 1 >> atomically (writeTVar battery 100)
+  Signal.monitor low recharge (sleep 1 >> use 15 >> sleep 1)
