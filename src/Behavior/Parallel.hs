@@ -30,4 +30,5 @@ module Behavior.Parallel
   , Nursery
   ) where
 
+import Behavior.Internal.Nursery
 import Behavior.Internal.Parallel

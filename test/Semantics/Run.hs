@@ -31,7 +31,8 @@ import qualified Data.Set as Set
 
 import Behavior.Internal.Failure hiding (Failed (..))
 import Behavior.Internal.Filter
-import Behavior.Internal.Parallel
+import Behavior.Internal.Nursery
+import Behavior.Internal.Parallel hiding (told)
 import Behavior.Internal.Reactive
 import Behavior.Internal.Runtime hiding (Event (..), Label)
 import Behavior.Internal.Sensor
