@@ -1,8 +1,12 @@
+{-# LANGUAGE LambdaCase #-}
+
 -- |
 -- Sends programs that call 'runBehavior' again and again a signal, each at a random
 -- moment of its life, and checks how it ended.
 --
 -- > signals 1000
+--
+-- (Without a number: 20.)
 --
 -- Each moment is a process of its own, which is waited for. It must end with 130 after a
 -- SIGINT and with 143 after a SIGTERM (as a shell shows that: a process that a signal has
@@ -15,6 +19,7 @@ import Control.Exception (bracket_, evaluate)
 import Control.Monad (forM, forever, unless, void, when)
 import Data.Bits (shiftL, shiftR, xor)
 import Data.List (group, sort, unfoldr)
+import Data.Maybe (isNothing)
 import Data.Word (Word64)
 import GHC.Clock (getMonotonicTimeNSec)
 import System.Environment (getArgs, getExecutablePath)
@@ -30,8 +35,9 @@ import Behavior (Behavior, runBehavior, sleep)
 main :: IO ()
 main = do
   hSetBuffering stdout LineBuffering
-  getArgs >>= \arguments -> case arguments of
+  getArgs >>= \case
     ["child", name] | Just act <- lookup name programs -> mark 'r' >> forever (runBehavior act)
+    [] -> attack 20
     [moments] | [(n, "")] <- reads moments, n > 0 -> attack n
     _ -> die "signals: the argument is the number of moments for each program, signal and runtime, 1000 say"
 
@@ -99,7 +105,7 @@ moment name capabilities signal delay = do
     putMVar seen rest
   -- The pipe is closed when the child has ended.
   inTime <- timeout 20000000 (takeMVar seen)
-  when (inTime == Nothing) $ signalProcess sigKILL child
+  when (isNothing inTime) $ signalProcess sigKILL child
   status <- getProcessStatus True False child
   pure $ case (inTime, status) of
     (Nothing, _) -> WithoutEffect

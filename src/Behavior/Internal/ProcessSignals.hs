@@ -20,17 +20,15 @@ module Behavior.Internal.ProcessSignals
   ( withSignals
   ) where
 
-import Control.Concurrent.STM (STM)
-
 #if defined(mingw32_HOST_OS)
-import Control.Concurrent.STM (retry)
+import Control.Concurrent.STM (STM, retry)
 
 -- | Runs the action with a transaction that waits for a signal. (There is none here.)
 withSignals :: (STM Int -> IO a) -> IO a
 withSignals act = act retry
 #else
 import Control.Concurrent.MVar (MVar, modifyMVar, modifyMVar_, newMVar)
-import Control.Concurrent.STM (TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
+import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Concurrent.STM.TVar (mkWeakTVar)
 import Control.Exception (bracket, uninterruptibleMask_)
 import Control.Monad (void)
