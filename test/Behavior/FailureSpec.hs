@@ -6,6 +6,7 @@ import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM (newTVarIO, readTVarIO, writeTVar)
 import Control.Exception
 import Control.Monad (void, (>=>))
+import Data.Either (fromRight)
 import Data.Foldable (for_)
 import Data.IORef
 import qualified Data.List.NonEmpty as NonEmpty
@@ -210,7 +211,7 @@ catchingAny = do
 
   inCallersState "its handler" (catchAny failed . const)
   inCallersState "its behaviour" (`catchAny` const (pure Unmasked))
-  inCallersState "its behaviour" (fmap (either (const Unmasked) id) . tryAny)
+  inCallersState "its behaviour" (fmap (fromRight Unmasked) . tryAny)
 
 fallbacksOver :: Spec
 fallbacksOver = do

@@ -321,7 +321,7 @@ attempt n act
 -- what the robot could not do there is '?'.
 --
 -- >>> tryAny (failWith "locked" :: Behavior ())
--- Left FailedBecause "locked"
+-- Left (FailedBecause "locked")
 --
 -- @since 0.1.0.0
 tryAny :: Behavior a -> Behavior (Either SomeException a)
