@@ -86,10 +86,10 @@ subtle =
   , -- What is shared faults before the body does, which stands first all the same.
     (alone (WithShared (Polled 1 (act 9 "s" Fails (EndsAfter 0 Faults))) (act 9 "b" Fails (EndsAfter 1 Faults))))
       { patience = 1
-      , caller = Stranger 9
+      , caller = Stranger Asynchronous 9
       }
   , -- It was high, unnoticed by the operator.
-    (alone (RSelect (And (Hysteresis 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
+    (alone (RSelect (And (Hysteresis False 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
       { changes = [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "q" (At 1)]
       }
   , -- A change has lasted just as it is taken back.
@@ -106,11 +106,11 @@ subtle =
   , -- It completes although asked to stop, and is asked again.
     (alone (Parallel (deaf 3 "a") (act 9 "b" Fails (EndsAfter 1 Faults)) `Else` act 9 "c" Fails StopsAtOnce))
       { patience = 1
-      , caller = Stranger 1
+      , caller = Stranger Asynchronous 1
       }
   , (alone (deaf 2 "a" `Then` (act 9 "b" Fails (EndsAfter 0 (Succeeds 1)) `Then` act 1 "c" Fails StopsAtOnce)))
       { patience = 1
-      , caller = Stranger 0
+      , caller = Stranger Asynchronous 0
       }
   ]
  where
@@ -232,16 +232,16 @@ relation = do
         `endsIn` [Gave 4 (Failed (timedOut 1))]
 
     it "throws the fault of a cleanup together with a stranger's cancellation" $ do
-      (with [] (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))) {patience = 2, caller = Stranger 1}
+      (with [] (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))) {patience = 2, caller = Stranger Asynchronous 1}
         `endsWith` [Gave 5 (Stopped (Just (cleanupOf "b")))]
     it "can be asked again by a stranger, but not in a cleanup" $ do
-      (with [] (stoppedBy (EndsAfter 0 (Succeeds 7)) "a" `Then` stoppedBy StopsAtOnce "b")) {patience = 2, caller = Stranger 1}
+      (with [] (stoppedBy (EndsAfter 0 (Succeeds 7)) "a" `Then` stoppedBy StopsAtOnce "b")) {patience = 2, caller = Stranger Asynchronous 1}
         `endsWith` [Gave 3 (Stopped Nothing)]
-      (with [] (stoppedBy (EndsAfter 2 (Succeeds 7)) "a")) {patience = 2, caller = Stranger 1}
+      (with [] (stoppedBy (EndsAfter 2 (Succeeds 7)) "a")) {patience = 2, caller = Stranger Asynchronous 1}
         `endsWith` [Gave 4 (Succeeded (Number 7))]
     it "can have its own cleanup cut short by a stranger, but not that of a branch" $ do
-      (with [] (stoppedBy (TidiesUp 5) "a")) {patience = 2, caller = Stranger 1} `endsWith` [Gave 3 (Stopped Nothing)]
-      (with [] (Timeout 50 (stoppedBy (TidiesUp 5) "a"))) {patience = 2, caller = Stranger 1}
+      (with [] (stoppedBy (TidiesUp 5) "a")) {patience = 2, caller = Stranger Asynchronous 1} `endsWith` [Gave 3 (Stopped Nothing)]
+      (with [] (Timeout 50 (stoppedBy (TidiesUp 5) "a"))) {patience = 2, caller = Stranger Asynchronous 1}
         `endsWith` [Gave 7 (Stopped Nothing)]
 
   describe "Conditions that change" $ do
@@ -289,7 +289,7 @@ relation = do
     it "remember that they were high" $
       with
         [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "p" (At 0)]
-        (WithShared (Hysteresis 0 2 (Watched "p")) (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7))))
+        (WithShared (Hysteresis False 0 2 (Watched "p")) (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7))))
         `endsWith` [Gave 3 (Failed doesNotHold)]
     it "do not follow a flicker" $
       with [Change 1 "p" (At 1), Change 2 "p" (At 0), Change 3 "p" (At 1)] (WaitUntil (Debounce 2 (Watched "p")))

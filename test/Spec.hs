@@ -5,6 +5,7 @@ import Test.Hspec
 import qualified Behavior.AlarmSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
+import qualified Behavior.FromOutsideSpec
 import qualified Behavior.MonitorSpec
 import qualified Behavior.NewsSpec
 import qualified Behavior.OperatorsSpec
@@ -62,6 +63,7 @@ main = hspec $ do
   describe "STM" Behavior.STMSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
+  describe "From outside" Behavior.FromOutsideSpec.spec
   describe "Promises" Behavior.PromisesSpec.spec
   describe "Storms" Behavior.StormSpec.spec
   describe "Space" $ do

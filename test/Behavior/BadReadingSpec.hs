@@ -12,7 +12,7 @@ import Test.Hspec
 
 import Behavior.Internal.Runtime (atomically, now)
 import Behavior.Internal.Scope (SomeBranch (..), ask, outcome, structured)
-import Behavior.Internal.Source (startWorkers)
+import Behavior.Internal.Source (startSensors)
 import qualified Behavior.Internal.Source as Source
 import qualified Behavior.Signal as Signal
 import Support
@@ -185,28 +185,28 @@ stale = do
 
   -- Seen from inside: when the reading began that it knows of.
   it "does not count the time between readings" $ do
-    source <- Source.open (Signal.polling (1 / 0) (pure ()))
-    reading <- Source.reading source
+    source <- Source.open (Signal.polling (1 / 0) (pure ())) Source.anything {Source.readingTimes = True}
+    let reading = Source.inFlightSince source
     atomically reading `shouldReturn` Nothing
     structured $ \scope -> do
-      (seen, _) <- startWorkers scope "test" source
-      atomically (Source.atFirst seen)
+      (seen, _) <- startSensors scope "test" source
+      atomically (Source.firstRead seen)
       atomically reading `shouldReturn` Nothing
       pure (pure ())
 
   it "does not count the time of a recovery, when it was stopped in the middle of a reading" $ do
     entered <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> hang)
-    source <- Source.open (sensing level)
-    reading <- Source.reading source
+    source <- Source.open (sensing level) Source.anything {Source.readingTimes = True}
+    let reading = Source.inFlightSince source
     structured $ \scope -> do
-      (_, workers) <- startWorkers scope "test" source
+      (_, workers) <- startSensors scope "test" source
       pass entered
       began <- atomically reading
       began `shouldSatisfy` isJust
       ask (map SomeBranch workers)
       for_ workers (atomically . outcome)
-      _ <- startWorkers scope "test" source
+      _ <- startSensors scope "test" source
       atomically reading >>= (`shouldSatisfy` (/= began))
       pure (pure ())
 

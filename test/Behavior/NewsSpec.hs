@@ -115,7 +115,7 @@ unnoticed :: Spec
 unnoticed = do
   prop "of a polled signal" $ sameAsUnheard id
   prop "of a debounced one, also if it changes to what looks the same" $ sameAsUnheard (Signal.debounce 2.5)
-  prop "of one with hysteresis" $ sameAsUnheard (fmap fromEnum . Signal.hysteresis 3 6)
+  prop "of one with hysteresis" $ sameAsUnheard (fmap fromEnum . Signal.hysteresis False 3 6)
 
   it "two operators on a shared signal each hear of what is news to them" $ do
     book <- newNotebook

@@ -62,11 +62,11 @@ spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In co
     inConstantMemory 100000 $ \step -> do
       level <- newTVarIO (100000 :: Int)
       let recovery = step >> atomically (modifyTVar' level (subtract 1))
-      Signal.monitor (Signal.hysteresis 0 1 (dialled level)) recovery (pure ())
+      Signal.monitor (Signal.hysteresis False 0 1 (dialled level)) recovery (pure ())
 
   it "a hundred thousand operators on one shared signal" $
     inConstantMemory 100000 $ \step ->
-      Signal.withShared (Signal.hysteresis 0 1 (pure (1 :: Int))) $ \s ->
+      Signal.withShared (Signal.hysteresis False 0 1 (pure (1 :: Int))) $ \s ->
         replicateM_ 100000 (step >> Signal.waitUntil s)
 
 onOneCapability :: IO a -> IO a

@@ -33,7 +33,7 @@ hysteresis = do
         book <- newNotebook
         position <- newTVarIO (0 :: Int)
         let level = (levels !!) <$> dialled position
-            signal = (,) <$> dialled position <*> Signal.hysteresis low high level
+            signal = (,) <$> dialled position <*> Signal.hysteresis False low high level
             branch (n, state) = do
               note book state
               unless (n + 1 == length levels) $ do
@@ -51,7 +51,7 @@ hysteresis = do
             atomically (writeTVar (underlying level) 50)
             eventually ((>= 1) <$> looks level (== self) 50)
             pure "left"
-      Signal.rSelect (Signal.hysteresis 10 90 (recorded level)) left (pure "right")
+      Signal.rSelect (Signal.hysteresis False 10 90 (recorded level)) left (pure "right")
         `shouldReturn` "left"
 
   it "remembers also what changed nothing for its operator" $ do
@@ -59,7 +59,7 @@ hysteresis = do
     level <- newRecorded (0 :: Int)
     armed <- newTVarIO False
     entered <- newGate
-    let signal = (&&) <$> dialled armed <*> Signal.hysteresis 10 90 (recorded level)
+    let signal = (&&) <$> dialled armed <*> Signal.hysteresis False 10 90 (recorded level)
         cool = note book "cool" >> atomically (writeTVar (underlying level) 10)
         task = do
           note book "task"
@@ -79,19 +79,19 @@ hysteresis = do
     let cool = do
           note book =<< readTVarIO level
           atomically (modifyTVar' level (subtract 30))
-    Signal.monitor (Signal.hysteresis 10 90 (dialled level)) cool (pure ())
+    Signal.monitor (Signal.hysteresis False 10 90 (dialled level)) cool (pure ())
     notes book `shouldReturn` [95, 65, 35]
 
   it "decides on the first reading, however long the period" $
     replicateM_ 200 $
-      Signal.rSelect (Signal.hysteresis 0 1 once) (pure "left") (pure "right")
+      Signal.rSelect (Signal.hysteresis False 0 1 once) (pure "left") (pure "right")
         `shouldReturn` "left"
 
   it "refuses thresholds the wrong way round, and nothing starts" $ do
     book <- newNotebook
-    let signal = Signal.hysteresis 2 1 (Signal.polling 0.001 ((1 :: Int) <$ note book "reading"))
+    let signal = Signal.hysteresis False 2 1 (Signal.polling 0.001 ((1 :: Int) <$ note book "reading"))
     ending (Signal.rSelect signal (note book "left") (note book "right"))
-      `shouldReturn` FaultedWith "hysteresis: the lower threshold must not be above the upper one"
+      `shouldReturn` FaultedWith "hysteresis: the lower threshold must be at most the upper one"
     notes book `shouldReturn` []
  where
   thresholds = do

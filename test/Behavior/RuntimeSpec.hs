@@ -73,7 +73,7 @@ starting = do
 
   it "always tells how it ended, even if it was killed as soon as it was started" $
     for_ [1 .. 2000 :: Int] $ \_ -> do
-      thread <- mask_ (start label hang) :: IO (Thread ())
+      thread <- mask_ (start label hang) :: IO (Thread (Either SomeException ()))
       killThread (threadId thread)
       end <- atomically (threadEnd thread)
       endingOf end `shouldBe` CancelledBy (show ThreadKilled)
@@ -83,7 +83,7 @@ interrupting = do
   it "returns when the thread has heard it" $ do
     inside <- newGate
     mayEnd <- newGate
-    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread ())
+    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
     pass inside
     launching (interrupt (threadId thread) (Cancel "thread")) $ \caller -> do
       poll caller >>= (`shouldBe` True) . isNothing
@@ -106,7 +106,7 @@ interrupting = do
   it "by a messenger does not wait" $ do
     inside <- newGate
     mayEnd <- newGate
-    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread ())
+    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
     pass inside
     interruptByMessengers (const (Cancel "thread")) [threadId thread]
     open mayEnd

@@ -131,7 +131,7 @@ sharing = do
 
   it "keeps a memory for all operators inside" $ do
     level <- newTVarIO (95 :: Int)
-    Signal.withShared (Signal.hysteresis 10 90 (dialled level)) $ \s -> do
+    Signal.withShared (Signal.hysteresis False 10 90 (dialled level)) $ \s -> do
       Signal.waitUntil s
       atomically (writeTVar level 50)
       Signal.rSelect s (pure "left") (pure "right") `shouldReturn` "left"

@@ -56,12 +56,12 @@ obeys clause stage' language' (Program tree deeds state) = do
         case end of
           Left e | cancelledBy (endingOf (end :: Either SomeException Int)) -> throwIO e
           -- Whoever was cancelled and goes on waits for ever.
-          _ -> if CancelsIt `elem` map snd deeds then hang else either throwIO pure end
+          _ -> if any (stopsIt . snd) deeds then hang else either throwIO pure end
       whole = calling stage' (atomically . writeTVar (weather theatre)) deeds caller
   end <- (if clause == Labels then reportingTo (labelling theatre) else id) (run stage' whole)
   case end of
     Gave outcome
-      | cancelledBy outcome, CancelsIt `notElem` map snd deeds -> broken ("a cancellation that nobody sent: " ++ show outcome)
+      | cancelledBy outcome, not (any (stopsIt . snd) deeds) -> broken ("a cancellation that nobody sent: " ++ show outcome)
     Gave _ -> pure ()
     other -> broken ("the frame of the trial ended: " ++ show other)
   found <- journal (complaints theatre)
@@ -80,6 +80,7 @@ cancelledBy :: Ending a -> Bool
 cancelledBy = \case
   CancelledBy _ -> True
   CancelledWithFault _ _ -> True
+  FaultedWith f -> f == show Outside
   _ -> False
 
 -- | One run of an operator, as it is observed.
@@ -192,7 +193,7 @@ contract t operator kind own end started = do
       CancelledWithFault _ f | f == leftmost -> pure ()
       _ -> wrong FaultOut ("the leftmost fault of its branches is " ++ leftmost)
     [] -> case end of
-      FaultedWith _ -> wrong Outcomes "no branch faulted"
+      FaultedWith f | f /= show Outside -> wrong Outcomes "no branch faulted"
       CancelledWithFault _ _ -> wrong Outcomes "no branch faulted"
       _ -> pure ()
   case end of

@@ -44,6 +44,7 @@ data Flaw
   | OrphansAtSecondCancel
   | AsksTwice
   | SwallowsCancellation
+  | TakesWhatIsThrownForItsOwn
   | FailsWhenCancelled
   | RecoversInAHandler
   | InheritsMasking
@@ -91,7 +92,7 @@ structured flaw operator body = mask $ \restore -> do
   verdict <- try (restore (body scope))
   faults <- end scope
   cancelled <- case verdict of
-    Left e | isCancellation e -> pure (Left e)
+    Left e | isCancellation e || flaw /= Just TakesWhatIsThrownForItsOwn -> pure (Left e)
     _ -> try (restore checkpoint)
   case (cancelled, if flaw == Just ThrowsTheRightmostFault then reverse faults else faults) of
     (Left cancellation, []) -> throwIO cancellation

@@ -52,7 +52,7 @@ copied flaw =
   numbers = map show [1 :: Int ..]
   believed (Signal opening)
     | flaw == Just TakesDeadForFalse =
-        Signal (fmap (\source -> source {view = looking (`catchSTM` \(_ :: SomeException) -> pure False) <$> view source}) opening)
+        Signal (fmap (\source -> source {view = looking (`catchSTM` \(_ :: SomeException) -> pure False) <$> view source}) . opening)
     | otherwise = Signal opening
 
 -- * Side by side
@@ -101,21 +101,21 @@ data Reaction a = Run String (Behavior a) | RunToEnd String (Behavior ()) | Conc
 
 react :: forall k a. Eq k => Maybe Flaw -> String -> Signal k -> (k -> Reaction a) -> Behavior a
 react flaw operator signal reaction = structured flaw operator $ \scope -> do
-  source <- open signal
+  source <- open signal anything
   let begin how = do
-        (works, seen) <- atomically ((,) <$> traverse (sequenceA . ceaseless) (workers source) <*> view source)
-        sensors <- for works (uncurry (worker scope))
+        (runs, seen) <- atomically ((,) <$> traverse prepared (workers source) <*> view source)
+        sensors <- for (zip (workers source) runs) (\(w, run) -> worker scope (workerName w) run)
         choose sensors seen how
 
-      choose :: [Branch ()] -> View k -> (View k -> STM k) -> IO (IO a)
-      choose sensors seen how = observe (how seen) >>= either (pure . throwIO) (obey sensors seen)
+      choose :: [Branch ()] -> View k -> Look -> IO (IO a)
+      choose sensors seen how = observe (lookAt how seen) >>= either (pure . throwIO) (obey sensors seen)
 
       obey sensors seen old = case reaction old of
         Conclude verdict -> pure verdict
         RunToEnd name recovery -> ask (map SomeBranch sensors) >> recover sensors seen name recovery Nothing
         Run name act -> do
           running <- branch scope name act
-          event <- observe ((Right <$> outcomeOf running) `orElse` (Left <$> (later seen >>= \new -> check (new /= old) >> pure new)))
+          event <- observe ((Right <$> outcomeOf running) `orElse` (Left <$> (reread seen >>= \new -> check (new /= old) >> pure new)))
           case event of
             Right (Right outcome) -> pure (settle outcome)
             Right (Left new) -> turn sensors seen new running (reaction new)
@@ -139,7 +139,7 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         (Conclude verdict, Done (Right _)) | flaw == Just DropsWhatCompletedInTime -> pure verdict
         (_, Done (Right a)) -> pure (pure a)
         (RunToEnd name recovery, Stopped _)
-          | flaw == Just ReadsAgainBeforeTheRecovery -> rested sensors >> begin later
+          | flaw == Just ReadsAgainBeforeTheRecovery -> rested sensors >> begin Reread
           | otherwise -> recover sensors seen name recovery Nothing
         (RunToEnd name recovery, wrong)
           | flaw /= Just ThrowsBeforeTheRecovery -> recover sensors seen name recovery (Just (settle wrong))
@@ -150,27 +150,28 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         again = case what of
           Run _ _
             | flaw == Just DoesNotReadAgain -> obey sensors seen new
-            | otherwise -> atomically (view source) >>= \fresh -> choose sensors fresh later
-          _ -> rested sensors >> begin later
+            | otherwise -> atomically (view source) >>= \fresh -> choose sensors fresh Reread
+          _ -> rested sensors >> begin Reread
 
       recover sensors seen name recovery aftermath = do
         recovered <- branch scope name recovery
         outcome <-
           if flaw == Just WatchesDuringTheRecovery
-            then observe ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ (later seen >>= \now' -> check (unwanted now'))))
+            then observe ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ (reread seen >>= \now' -> check (unwanted now'))))
             else Right . Just <$> atomically (outcomeOf recovered)
         case (outcome, aftermath) of
-          (Right (Just (Done (Right ()))), Nothing) -> rested sensors >> begin later
+          (Right (Just (Done (Right ()))), Nothing) -> rested sensors >> begin Reread
           (Right (Just wrong), Nothing) -> pure (settle wrong >> throwIO (ErrorCall "unreachable"))
           (_, Just verdict) -> pure verdict
-          (_, Nothing) -> stop [] recovered >> rested sensors >> begin later
+          (_, Nothing) -> stop [] recovered >> rested sensors >> begin Reread
 
       unwanted value = case reaction value of
         RunToEnd _ _ -> False
         _ -> True
-  begin atFirst
+  begin FirstRead
  where
-  observe act = trySynchronous (atomically act)
+  observe :: STM b -> IO (Either SomeException b)
+  observe act = atomically ((Right <$> act) `catchSTM` (pure . Left))
   rested = traverse_ (atomically . outcomeOf)
 
 timeoutWith :: Maybe Flaw -> Seconds -> Behavior a -> Behavior a
@@ -186,13 +187,13 @@ timeoutWith flaw seconds act
   | otherwise = do
       over <- newTVarIO False
       let clock = sleep seconds >> atomically (writeTVar over True)
-          elapsed = Signal (pure (viewing (pure (always (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
+          elapsed = Signal (\_ -> pure (viewing (pure (always (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
       react flaw "timeout" elapsed (\up -> if up then Conclude (throwIO (TimedOut seconds)) else Run "branch" act)
 
 -- * Sensors
 
 pollingWith :: Maybe Flaw -> Seconds -> Behavior a -> Signal a
-pollingWith flaw every act = Signal $ do
+pollingWith flaw every act = Signal $ \_ -> do
   nextSlot <- newTVarIO Nothing
   started <- newTVarIO (0 :: Int)
   newest <- newTVarIO Nothing
@@ -208,7 +209,7 @@ pollingWith flaw every act = Signal $ do
         if stopping
           then either throwIO (const (throwIO ThreadKilled)) read'
           else atomically (writeTVar newest (Just (k, read')))
-      prepared = do
+      prepare = do
         unless (flaw /= Just ForgetsThePeriod) (writeTVar nextSlot Nothing)
         pure (\asked -> readings asked `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
       seen = do
@@ -217,4 +218,4 @@ pollingWith flaw every act = Signal $ do
           readTVar newest >>= \case
             Just (k, read') | k > before -> either throwSTM pure read'
             _ -> retry
-  pure (viewing seen) {workers = [Worker "polling" prepared]}
+  pure (viewing seen) {workers = [Worker "polling" prepare]}

@@ -1,4 +1,5 @@
 {-# LANGUAGE ExistentialQuantification #-}
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE RankNTypes #-}
 
 -- |
@@ -17,6 +18,8 @@ module Promises.Stage
   , pause
   , calling
   , Deed (..)
+  , stopsIt
+  , Outside (..)
 
     -- * Actions
   , Act (..)
@@ -109,8 +112,22 @@ pause stage n
 data Deed world
   = -- | Its caller is cancelled.
     CancelsIt
+  | -- | The same, by an exception of a synchronous type.
+    ThrowsAtIt
   | Changes world
   deriving (Eq, Show)
+
+-- | What is thrown at a caller, though it is of a synchronous type.
+data Outside = Outside
+  deriving (Show)
+
+instance Exception Outside
+
+stopsIt :: Deed world -> Bool
+stopsIt = \case
+  CancelsIt -> True
+  ThrowsAtIt -> True
+  Changes _ -> False
 
 -- | Runs the behaviour while these deeds are done, each so many ticks after the one
 -- before. With nothing to do the caller is the thread that is there already.
@@ -122,6 +139,7 @@ calling stage change deeds act = do
     pause stage after
     case deed of
       CancelsIt -> interruptByMessengers (const (Cancel "the caller")) [threadId caller]
+      ThrowsAtIt -> interruptByMessengers (const Outside) [threadId caller]
       Changes world -> change world
   endingOf <$> atomically (threadEnd caller)
 

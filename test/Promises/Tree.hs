@@ -56,7 +56,7 @@ programsOf root size = case size of
   states = frequency [(4, pure Unmasked), (1, pure MaskedInterruptible), (1, pure MaskedUninterruptible)]
   deeds = do
     changes <- choose someChanges >>= \n -> vectorOf n (Changes <$> choose (0, 3))
-    cancels <- frequency [(1, pure 0), (3, pure 1), (2, pure 2)] >>= \n -> pure (replicate n CancelsIt)
+    cancels <- frequency [(1, pure 0), (3, pure 1), (2, pure 2)] >>= \n -> vectorOf n (frequency [(2, pure CancelsIt), (1, pure ThrowsAtIt)])
     order <- shuffle (changes ++ cancels)
     traverse (\deed -> (\after -> (after, deed)) <$> choose (0, 2)) order
 

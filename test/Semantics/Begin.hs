@@ -30,7 +30,7 @@ initial world =
             [ thread start "firstOf: 1" (program world)
             , Thread "firstOf: 2" (Living Unasked (Changing (changes world) (patience world)))
             ]
-        Stranger later ->
+        Stranger _ later ->
           Called Unasked (Starting (program world)) (changes world) [patience world, patience world + later]
     }
  where
@@ -71,7 +71,7 @@ opened t p = case p of
   WithShared signal body -> Sharing (open t signal) (thread t "withShared: body" body)
   TeleoReactive rules -> following (startedAt t (Joined FirstHolding (map (made . fst) rules)))
   _ -> case signals p of
-    signal : _ -> following (readingOnce (open t signal))
+    signal : _ -> following (open t signal)
     [] -> error "opened: this operator has no signal"
  where
   following source = Reacting p source (viewOf t source) (Choosing First)

@@ -37,7 +37,7 @@ smallWorlds = do
   someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure Lost)]
 
 callers :: Gen Caller
-callers = frequency [(3, pure Operator), (1, Stranger <$> choose (0, 3))]
+callers = frequency [(3, pure Operator), (1, Stranger <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))]
 
 inOrder :: [Change] -> [Change]
 inOrder = sortOn (\(Change at _ _) -> at)
@@ -96,7 +96,10 @@ within' inScope sharing = go
       , (1, Debounce <$> choose (0, 3) <*> sensor n)
       , (1, StaleAfter <$> choose (1, 3) <*> sensor n)
       ]
-  hysteresis = elements [Hysteresis low high | (low, high) <- [(0, 2), (0, 2), (0, 1), (1, 1), (1, 2)]]
+  hysteresis = do
+    initially <- arbitrary
+    (low, high) <- elements [(0, 2), (0, 2), (0, 1), (1, 1), (1, 2)]
+    pure (Hysteresis initially low high)
   sensor n =
     frequency $
       [ (8, Watched <$> elements known)

@@ -43,7 +43,7 @@ ofSignal = \case
   Watched _ -> []
   Polled _ a -> [a]
   And s s' -> ofSignal s ++ ofSignal s'
-  Hysteresis _ _ s -> ofSignal s
+  Hysteresis _ _ _ s -> ofSignal s
   Debounce _ s -> ofSignal s
   StaleAfter _ s -> ofSignal s
   Shared -> []
@@ -80,7 +80,7 @@ sensing :: Signal -> [Program] -> (Signal, [Program])
 sensing signal as = case (signal, as) of
   (Polled n _, a : others) -> (Polled n a, others)
   (And s s', _) -> let (new, others) = sensing s as in first (And new) (sensing s' others)
-  (Hysteresis low high s, _) -> first (Hysteresis low high) (sensing s as)
+  (Hysteresis initially low high s, _) -> first (Hysteresis initially low high) (sensing s as)
   (Debounce n s, _) -> first (Debounce n) (sensing s as)
   (StaleAfter n s, _) -> first (StaleAfter n) (sensing s as)
   _ -> (signal, as)

@@ -26,6 +26,7 @@ module Semantics.Program
   , World (..)
   , Change (..)
   , Caller (..)
+  , ExceptionType (..)
 
     -- * What comes of them
   , Result (..)
@@ -90,7 +91,7 @@ data Signal
   | -- | One where both hold, otherwise zero.
     And Signal Signal
   | -- | One where it is high, otherwise zero. The lower threshold comes first.
-    Hysteresis Int Int Signal
+    Hysteresis Bool Int Int Signal
   | Debounce Ticks Signal
   | StaleAfter Ticks Signal
   | -- | The signal of the nearest 'WithShared' around it.
@@ -167,8 +168,13 @@ data Caller
     --
     -- > firstOf [program, the environment, which makes the changes]
     Operator
-  | -- | Somebody who knows nothing of operators, and after so many ticks asks again.
-    Stranger Ticks
+  | -- | A thread that knows nothing of operators; after the given number of ticks it throws
+    -- again.
+    Stranger ExceptionType Ticks
+  deriving (Eq, Ord, Show)
+
+-- | Of what type the exceptions are that a stranger throws.
+data ExceptionType = Asynchronous | Synchronous
   deriving (Eq, Ord, Show)
 
 -- | When a condition changes, and to what.

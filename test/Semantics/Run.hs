@@ -26,6 +26,7 @@ import Data.Foldable (for_)
 import Data.IORef
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
+import Data.Maybe (isJust)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
@@ -127,9 +128,11 @@ behavior tell world = do
   let played = play tell stage (program world)
   case caller world of
     Operator -> firstOf [played, timeIsUp <$ environment stage]
-    Stranger later -> do
+    Stranger type' later -> do
       thread <- mask_ (start (Sim.Label "stranger" "") played)
-      let interrupting = interruptByMessengers (const Enough) [threadId thread]
+      let interrupting = case type' of
+            Asynchronous -> interruptByMessengers (const Enough) [threadId thread]
+            Synchronous -> interruptByMessengers (const EnoughOfThis) [threadId thread]
       environment stage
       interrupting
       sleepUntil (fromIntegral (patience world + later))
@@ -178,7 +181,7 @@ play tell stage = go
     Watched condition -> watching (reading condition)
     Polled every p -> number <$> polling (fromIntegral every) (go p)
     And a b -> (\m n -> fromEnum (holds m && holds n)) <$> level a <*> level b
-    Hysteresis low high signal -> fromEnum <$> hysteresis low high (level signal)
+    Hysteresis initially low high signal -> fromEnum <$> hysteresis initially low high (level signal)
     Debounce n signal -> debounce (fromIntegral n) (level signal)
     StaleAfter n signal -> staleAfter (fromIntegral n) (level signal)
     Shared -> nearest stage
@@ -200,7 +203,7 @@ act tell name script = do
     try (inState restore (wait (takes script))) >>= \case
       Right () -> finish name (ends script)
       Left e
-        | not (isCancellation e) -> throwIO e
+        | not (isStopRequest e) -> throwIO e
         | otherwise -> do
             tell Hears
             case whenAsked script of
@@ -228,7 +231,7 @@ act tell name script = do
 thrown :: SomeException -> Result
 thrown e
   | Just (StoppedWithFault _ fault) <- fromException e = Stopped (Just (show fault))
-  | isCancellation e = Stopped Nothing
+  | isStopRequest e = Stopped Nothing
   | isFailure e = Failed (show e)
   | otherwise = Faulted (show e)
 
@@ -241,9 +244,18 @@ instance Exception Failure where
   toException = behaviorFailedToException
   fromException = behaviorFailedFromException
 
--- | What a stranger throws.
+-- | Whether it stops what runs; what a stranger throws does, whatever its type.
+isStopRequest :: SomeException -> Bool
+isStopRequest e = isCancellation e || isJust (fromException e :: Maybe EnoughOfThis)
+
+-- | What a stranger throws, of an asynchronous type and of a synchronous one.
 data Enough = Enough
   deriving (Show)
+
+data EnoughOfThis = EnoughOfThis
+  deriving (Show)
+
+instance Exception EnoughOfThis
 
 instance Exception Enough where
   toException = asyncExceptionToException

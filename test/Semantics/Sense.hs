@@ -72,7 +72,7 @@ pollerSteps steps hear t s =
                 (begin t (sensor s))
       Reading r -> [(l, t', read' s r') | (l, t', r') <- steps t r]
       Read result ->
-        silently t s {newest = Just (readings s, result), underWay = Nothing, poll = next (nextSlot (slot s))}
+        silently t s {newest = Just (readings s, result), underWay = Nothing, poll = Sleeping (nextSlot (slot s))}
       Leaving result -> silently t s {poll = Rested (asOutcome result)}
       _ -> []
       ++ [(Happens event, t, s') | asked s == Asked, Just (event, s') <- [hears]]
@@ -89,7 +89,6 @@ pollerSteps steps hear t s =
     Rested _ -> Nothing
     _ -> Just (Silent, heard {poll = Rested (Stopped Nothing)})
   heard = s {asked = Heard}
-  next = if alone s then Pausing else Sleeping
   -- Slots that were missed are skipped.
   nextSlot due
     | due >= clock t = due

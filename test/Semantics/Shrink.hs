@@ -73,7 +73,7 @@ shrinkSignal = \case
   Watched _ -> []
   Polled n a -> Watched "p" : [Polled (n - 1) a | n > 1]
   And a b -> [a, b] ++ [And a' b | a' <- shrinkSignal a] ++ [And a b' | b' <- shrinkSignal b]
-  Hysteresis low high s -> s : (Hysteresis low high <$> shrinkSignal s)
+  Hysteresis initially low high s -> s : (Hysteresis initially low high <$> shrinkSignal s)
   Debounce n s -> s : (Debounce n <$> shrinkSignal s)
   StaleAfter n s -> s : (StaleAfter n <$> shrinkSignal s)
   Shared -> [Watched "p"]

@@ -9,8 +9,6 @@ module Semantics.Source
   , open
   , made
   , startedAt
-  , readingOnce
-  , readingOn
   , viewOf
 
     -- * Looking
@@ -54,7 +52,7 @@ borrows = \case
   Watched _ -> False
   Polled _ _ -> False
   And a b -> borrows a || borrows b
-  Hysteresis _ _ s -> borrows s
+  Hysteresis _ _ _ s -> borrows s
   Debounce _ s -> borrows s
   StaleAfter _ s -> borrows s
 
@@ -76,11 +74,10 @@ made = \case
         , newest = Nothing
         , underWay = Nothing
         , asked = Heard
-        , alone = False
         , poll = Rested (Stopped Nothing)
         }
   And a b -> Joined AllHold [made a, made b]
-  Hysteresis l h s -> Remembering Memory {low = l, high = h, isHigh = False, reminder = resting} (made s)
+  Hysteresis initially l h s -> Remembering Memory {low = l, high = h, isHigh = initially, reminder = resting} (made s)
   Debounce n s ->
     Settling
       Debouncer
@@ -125,18 +122,6 @@ startedAt t = \case
  where
   looksAt inner = Worker {request = Unasked, view = viewOf t inner}
   calmed w = w {overdue = overdue w + overdue w `mod` 2}
-
--- | For an operator that has not decided yet.
-readingOnce :: Source -> Source
-readingOnce = \case
-  Polling s -> Polling s {alone = True}
-  other -> other
-
--- | For an operator that waits.
-readingOn :: Source -> Source
-readingOn = \case
-  Polling s@Poller {poll = Pausing next} -> Polling s {alone = False, poll = Sleeping next}
-  other -> other
 
 -- | A view of the values that are read from now on.
 viewOf :: Now -> Source -> View

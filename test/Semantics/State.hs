@@ -174,9 +174,6 @@ data Poller = Poller
   , underWay :: Maybe Ticks
   -- ^ Since when.
   , asked :: Request
-  , alone :: Bool
-  -- ^ Whether nothing else runs for the operator, which then has it read once before it
-  -- decides, and read on only while it waits.
   , poll :: Poll
   }
   deriving (Eq, Ord, Show)
@@ -184,8 +181,6 @@ data Poller = Poller
 data Poll
   = Sleeping Ticks
   | Reading Running
-  | -- | Until the operator waits for another reading.
-    Pausing Ticks
   | -- | It is there, but not yet known.
     Read Result
   | -- | Likewise of the end.

@@ -249,9 +249,9 @@ reactions t p source v phase = case phase of
   inThread inPlace branch = [(l, t', Reacting p source v (inPlace branch')) | (l, t', branch') <- threadSteps t branch]
   differs old (value, _, _) = valueOf p value /= old
   obey (seen, t', source') = silently t' $ case reaction p value of
-    Run act -> Reacting p (readingOn source') v (Following value (thread t' (nameOf p value) act))
+    Run act -> Reacting p source' v (Following value (thread t' (nameOf p value) act))
     RunToEnd recovery -> recover Nothing (askSource source') recovery
-    Idle -> Reacting p (readingOn source') v (Idling value)
+    Idle -> Reacting p source' v (Idling value)
     Conclude result -> conclude React result source' []
    where
     value = valueOf p seen
@@ -289,4 +289,4 @@ reacting t p source v phase = case phase of
 beginning :: Now -> Program -> Source -> Running
 beginning t p source = Reacting p fresh (viewOf t fresh) (Choosing Later)
  where
-  fresh = readingOnce (startedAt t source)
+  fresh = startedAt t source

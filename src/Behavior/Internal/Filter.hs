@@ -9,7 +9,7 @@ module Behavior.Internal.Filter
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, throwIO)
-import Control.Monad (forever, when)
+import Control.Monad (forever, unless, when)
 
 import Behavior.Internal.Runtime
 import Behavior.Internal.Seconds (duration)
@@ -27,9 +27,9 @@ import Behavior.Internal.Source
 --
 -- @since 0.1.0.0
 debounce :: Eq a => Seconds -> Signal a -> Signal a
-debounce seconds signal = Signal $ do
+debounce seconds signal = Signal $ \demand -> do
   _ <- duration "debounce" seconds
-  source <- open signal
+  source <- open (suppressEqual signal) demand
   settled <- newTVarIO Nothing
   pending <- newTVarIO Nothing -- a value that differs, and since when
   let noticing value = do
@@ -59,28 +59,30 @@ debounce seconds signal = Signal $ do
                ]
       , -- The look at the source itself is for what it throws.
         view = looking (*> (readTVar settled >>= maybe retry pure)) <$> view source
-      , alike = \_ -> alike source (==)
       }
 
--- | @hysteresis low high signal@ becomes true when the signal reaches @high@, and
--- false when it falls to @low@; in between it keeps its value, which at first is
--- false. (A Schmitt trigger.) That memory lasts for the operator's whole run,
--- across recoveries.
+-- | A Schmitt trigger: @hysteresis initial low high signal@ becomes true when the signal
+-- reaches @high@, and false when it falls to @low@; in between it keeps its value, which
+-- before that is @initial@.
 --
--- @low@ must not be above @high@ (an 'ErrorCall' says so).
+-- The memory lasts for the operator's whole run, across recoveries, but no longer: the next
+-- operator begins with @initial@. 'Behavior.Signal.withShared' around several operators makes
+-- it outlive each of them.
+--
+-- @low@ must not be above @high@, and neither may be a NaN (an 'ErrorCall' says so).
 --
 -- >>> let level = pure 50 :: Signal Int
--- >>> let charged = Signal.hysteresis 10 90 level
+-- >>> let charged = Signal.hysteresis True 20 80 level
 -- >>> Signal.rSelect charged (pure "work") (pure "charge")
--- "charge"
+-- "work"
 --
 -- @since 0.1.0.0
-hysteresis :: Ord a => a -> a -> Signal a -> Signal Bool
-hysteresis low high signal = Signal $ do
-  when (low > high) . throwIO . ErrorCall $
-    "hysteresis: the lower threshold must not be above the upper one"
-  source <- open signal
-  memory <- newTVarIO False
+hysteresis :: Ord a => Bool -> a -> a -> Signal a -> Signal Bool
+hysteresis initial low high signal = Signal $ \demand -> do
+  unless (low <= high) . throwIO . ErrorCall $
+    "hysteresis: the lower threshold must be at most the upper one"
+  source <- open (suppressEqual signal) anything {readingTimes = readingTimes demand}
+  memory <- newTVarIO initial
   let state value = do
         v <- value
         before <- readTVar memory
@@ -98,10 +100,9 @@ hysteresis low high signal = Signal $ do
     source
       { workers = workers source ++ [Worker "hysteresis" (const . remembering . quietly <$> view source)]
       , view = looking state <$> view source
-      , alike = \_ -> alike source (==)
       }
 
 -- | A look for those who wait for values only: what it throws is for the operator,
 -- which looks for itself.
 quietly :: View a -> STM a
-quietly v = atFirst v `catchSTM` \(_ :: SomeException) -> retry
+quietly v = firstRead v `catchSTM` \(_ :: SomeException) -> retry

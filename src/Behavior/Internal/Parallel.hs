@@ -19,7 +19,7 @@ module Behavior.Internal.Parallel
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (SomeException, throwIO)
+import Control.Exception (SomeException, evaluate, throwIO)
 import Control.Monad (foldM, void, (<=<), (<$!>))
 import Data.Foldable (toList)
 import Data.Traversable (mapAccumL)
@@ -120,10 +120,10 @@ both left right = structured $ \scope -> do
 -- @since 0.1.0.0
 firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
-firstOf behaviors = structured $ \scope -> do
+firstOf behaviors = counted behaviors $ \scope -> do
   first <- newTVarIO Nothing
   void $ startAll (\n -> branchThen (tell first n) scope (Label "firstOf" (show n))) behaviors
-  either throwIO pure <$> unlessAtAGlance (toldNow first) (atomically (told first))
+  settle <$> unlessAtAGlance (toldNow first) (atomically (told first))
 
 -- | Starts all at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
@@ -138,9 +138,9 @@ firstOf behaviors = structured $ \scope -> do
 --
 -- @since 0.1.0.0
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
-allOf behaviors = structured $ \scope -> do
+allOf behaviors = counted acts $ \scope -> do
   trouble <- newTVarIO Nothing
-  branches <- startAll (\n -> branchThen (tellTrouble trouble n) scope (Label "allOf" (show n))) (toList behaviors)
+  branches <- startAll (\n -> branchThen (tellTrouble trouble n) scope (Label "allOf" (show n))) acts
   let waiting [] = pure (refilled behaviors <$> traverse (settle <=< ended) branches)
       waiting (b : bs) = do
         wrong <-
@@ -150,6 +150,13 @@ allOf behaviors = structured $ \scope -> do
               _ -> Just <$> told trouble
         maybe (waiting bs) (pure . throwIO) wrong
   waiting branches
+ where
+  acts = toList behaviors
+
+-- | 'structured', when it is known how many behaviours there are: what is thrown while they
+-- are counted is thrown before any is started.
+counted :: [Behavior x] -> (Scope -> IO (IO a)) -> IO a
+counted behaviors body = evaluate (length behaviors) >> structured body
 
 -- | The container, with these (as many) for its elements.
 refilled :: Traversable t => t x -> [a] -> t a
@@ -179,8 +186,8 @@ tell leftmost n x =
     _ -> writeTVar leftmost (Just (n, x))
 
 -- | Tells what a branch threw, if it did.
-tellTrouble :: Told SomeException -> Int -> Either SomeException a -> STM ()
-tellTrouble trouble n = either (tell trouble n) (\_ -> pure ())
+tellTrouble :: Told SomeException -> Int -> Outcome a -> STM ()
+tellTrouble trouble n = either (tell trouble n) (\_ -> pure ()) . result
 
 -- | What was told; retries until something was.
 told :: Told x -> STM x

@@ -20,11 +20,12 @@ module Behavior.Internal.Reactive
   , whileHolding
   ) where
 
-import Control.Concurrent.STM (STM, check)
+import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
 import Data.List (findIndex)
+import Data.Maybe (catMaybes)
 
-import Behavior.Internal.Failure (Behavior, catchSynchronous, failWith)
+import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Runtime (Label (..), atomically, unlessAtAGlance)
 import Behavior.Internal.Scope
 import Behavior.Internal.Source
@@ -53,78 +54,99 @@ data Engine k a = Engine
   , reaction :: k -> Reaction a
   }
 
+-- | What wakes the operator.
+data Wakeup k a
+  = BranchEnded (Outcome a)
+  | Changed k !(Reaction a)
+  | SensorDied SomeException
+
+-- | Why a branch is stopped: what is to come once it has ended.
+data Interruption a
+  = Reselect
+  | Recover String (Behavior ())
+  | Finish (IO a)
+
 -- | Runs what the reaction to the signal's value says, and switches when it says
 -- something else.
 react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
-react name signal reacting = structured $ \within -> do
-  opened <- open (distinct signal)
-  begin Engine {operator = name, scope = within, source = opened, reaction = reacting} atFirst
+react name signal reacting = do
+  -- (Before any branch is started: what opening throws needs no care.)
+  opened <- open (suppressEqual signal) anything
+  structured $ \within ->
+    begin Engine {operator = name, scope = within, source = opened, reaction = reacting} FirstRead
 
--- | Starts the sensors, and looks in the given way.
-begin :: Eq k => Engine k a -> (View k -> STM k) -> IO (IO a)
+-- | Starts the sensors, and looks.
+begin :: Eq k => Engine k a -> Look -> IO (IO a)
 begin engine how = do
   (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
-  choose engine sensors seen how
+  select engine sensors seen how
 
 -- | Nothing runs: reads, and does what the value says now.
-choose :: Eq k => Engine k a -> Sensors -> View k -> (View k -> STM k) -> IO (IO a)
-choose engine sensors seen how = atomically (attend sensors (how seen)) >>= obey engine sensors seen
+select :: Eq k => Engine k a -> Sensors -> View k -> Look -> IO (IO a)
+select engine sensors seen how =
+  atomically (changed engine sensors (lookAt how seen)) >>= follow engine sensors seen
 
-obey :: Eq k => Engine k a -> Sensors -> View k -> Either SomeException k -> IO (IO a)
-obey engine sensors seen = \case
-  Left dead -> pure (throwIO dead)
-  Right old -> case reaction engine old of
-    Conclude verdict -> pure verdict
-    RunToEnd name recovery -> do
-      askWithoutWaiting (sensorBranches sensors)
-      recover engine sensors name recovery Nothing
-    Idle -> do
-      awake <- goOn (scope engine) sensors
-      observe (attend awake (changed old)) >>= obey engine awake seen
-    Run name act -> do
-      running <- branch (scope engine) (Label (operator engine) name) act
-      -- The branch is looked at first: one that has ended by itself is not
-      -- interrupted, whatever the signal says in the same transaction.
-      unlessAtAGlance (fmap settle <$> outcomeNow running) $ do
-        awake <- goOn (scope engine) sensors
-        event <-
-          observe $
-            outcomeSoFar running
-              >>= maybe (fmap Right <$> attend awake (changed old)) (pure . Right . Left)
-        case event of
-          Right (Left end) -> pure (settle end)
-          Right (Right new) -> interrupt engine awake running (reaction engine new)
-          Left dead -> interrupt engine awake running (Conclude (throwIO dead))
+-- | What a look at the signal says. It runs users' code (views, functions, equality): what that
+-- throws is caught here, so that what is thrown elsewhere in the operator's thread came from
+-- outside.
+changed :: Engine k a -> Sensors -> STM k -> STM (Wakeup k a)
+changed engine sensors value =
+  diedOf sensors >>= \case
+    Just dead -> pure (SensorDied dead)
+    Nothing -> (value >>= \k -> pure $! Changed k (reaction engine k)) `catchSTM` (pure . SensorDied)
+
+-- | Does what the wakeup says; no branch runs.
+follow :: Eq k => Engine k a -> Sensors -> View k -> Wakeup k a -> IO (IO a)
+follow engine sensors seen = \case
+  BranchEnded end -> pure (settle end)
+  SensorDied e -> pure (throwIO e)
+  Changed _ (Conclude verdict) -> pure verdict
+  Changed _ (RunToEnd name recovery) -> do
+    askWithoutWaiting (map SomeBranch sensors)
+    recover engine sensors name recovery Nothing
+  Changed old Idle -> atomically (changedFrom old) >>= follow engine sensors seen
+  Changed old (Run name act) -> do
+    running <- branch (scope engine) (Label (operator engine) name) act
+    -- The branch is looked at first: one that has ended by itself is not
+    -- interrupted, whatever the signal says in the same transaction.
+    wakeup <-
+      unlessAtAGlance (fmap BranchEnded <$> outcomeNow running) . atomically $
+        outcomeSoFar running >>= maybe (changedFrom old) (pure . BranchEnded)
+    case wakeup of
+      BranchEnded end -> pure (settle end)
+      SensorDied e -> interrupt engine sensors running (Finish (throwIO e))
+      Changed _ new -> interrupt engine sensors running $ case new of
+        Conclude verdict -> Finish verdict
+        RunToEnd name' recovery -> Recover name' recovery
+        _ -> Reselect
  where
-  changed old = do
-    new <- later seen
-    check (new /= old)
-    pure new
+  changedFrom old = changed engine sensors (reread seen >>= \new -> new <$ check (new /= old))
 
--- | What is to come comes if the branch stops as it is asked to. If it completes all
--- the same, it has completed, and that is the end.
-interrupt :: Eq k => Engine k a -> Sensors -> Branch a -> Reaction a -> IO (IO a)
+-- | Stops the branch. If it completes all the same, it has completed, and that is the end.
+interrupt :: Eq k => Engine k a -> Sensors -> Branch a -> Interruption a -> IO (IO a)
 interrupt engine sensors running = \case
-  Conclude verdict ->
-    stopping (sensorBranches sensors) >>= \case
+  Finish verdict ->
+    stop (running' : sensors') >>= \case
       Stopped _ -> pure verdict
       end -> pure (settle end)
-  RunToEnd name recovery ->
-    stopping (sensorBranches sensors) >>= \case
+  Recover name recovery ->
+    stop (running' : sensors') >>= \case
       Completed a -> pure (pure a)
       Stopped _ -> forget (scope engine) running >> recover engine sensors name recovery Nothing
       -- A cleanup that went wrong must not keep the robot from its charger.
       wrong -> recover engine sensors name recovery (Just (settle wrong))
-  _ ->
-    stopping [] >>= \case
+  Reselect ->
+    stop [running'] >>= \case
       -- Read again: by now the value may be another, or the old one again.
       Stopped _ -> do
         forget (scope engine) running
         seen <- atomically (view (source engine))
-        choose engine sensors seen later
+        select engine sensors seen Reread
       end -> pure (settle end)
  where
-  stopping others = ask (SomeBranch running : others) >> ended running
+  running' = SomeBranch running
+  sensors' = map SomeBranch sensors
+  stop branches = ask branches >> ended running
 
 -- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
 -- those that are slow to, but what comes after it does.
@@ -137,26 +159,18 @@ recover engine sensors name recovery aftermath = do
     (Left wrong, Nothing) -> pure (throwIO wrong)
     (Right (), Nothing) -> do
       forget (scope engine) recovered
-      rested <- traverse (rest (scope engine)) (sensorBranches sensors)
-      if and rested then begin engine later else pure (failWith "a sensor faulted")
+      faults <- catMaybes <$> traverse (awaitStopped (scope engine)) sensors
+      case faults of
+        [] -> begin engine Reread
+        fault : _ -> pure (throwIO fault)
 
--- | Looks at a value, and first at the sensors that it comes from.
-attend :: Sensors -> STM a -> STM (Either SomeException a)
-attend sensors value = lost sensors >>= maybe (Right <$> value) (pure . Left)
-
--- | Waits for a transaction; what it throws is a sensor's. (Not inlined: who waits is to keep
--- the transaction alone, and not a second time in a handler's closure.)
-observe :: STM (Either SomeException a) -> IO (Either SomeException a)
-observe transaction = atomically transaction `catchSynchronous` (pure . Left)
-{-# NOINLINE observe #-}
-
--- | Waits until a branch that was asked to stop has ended. If it faulted it stays
+-- | Waits until a branch whose stop was requested has ended. If it faulted it stays
 -- in the scope, which throws its fault.
-rest :: Scope -> SomeBranch -> IO Bool
-rest within (SomeBranch sensor) =
+awaitStopped :: Scope -> Branch () -> IO (Maybe SomeException)
+awaitStopped within sensor =
   ended sensor >>= \case
-    Faulted _ -> pure False
-    _ -> True <$ forget within sensor
+    Faulted fault -> pure (Just fault)
+    _ -> Nothing <$ forget within sensor
 
 -- | A reactive @if@: runs @left@ while the condition is true and @right@ while it
 -- is false, and switches whenever it changes.
@@ -255,7 +269,7 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
   Nothing -> Idle
   Just n -> Run ("rule " ++ show (n + 1)) (snd (rules !! n))
  where
-  firstHolding = findIndex id <$> traverse (distinct . fst) rules
+  firstHolding = findIndex id <$> traverse (suppressEqual . fst) rules
 
 -- | Waits until the condition holds; returns at once if it does.
 --

@@ -18,7 +18,7 @@ module Behavior.Internal.Runtime
   , threadEndSoFar
   , threadEndNow
   , start
-  , startThen
+  , startWith
   , interrupt
   , interruptByMessengers
   , living
@@ -73,57 +73,58 @@ import Behavior.Internal.Seam
 import Behavior.Internal.Seconds
 import Behavior.Internal.Simulator
 
--- | A thread that the library has started, and how it ends.
-data Thread a = Thread
+-- | A thread that the library has started, and what it publishes as it ends.
+data Thread r = Thread
   { threadId :: {-# UNPACK #-} !ThreadId
-  , threadResult :: {-# UNPACK #-} !(TVar (Maybe (Either SomeException a)))
+  , threadResult :: {-# UNPACK #-} !(TVar (Maybe r))
   -- ^ Nothing until it has ended, cleanup included.
   }
 
--- | How the thread ends; retries until it has.
-threadEnd :: Thread a -> STM (Either SomeException a)
+-- | What the thread published; retries until it has ended.
+threadEnd :: Thread r -> STM r
 threadEnd thread = threadEndSoFar thread >>= maybe STM.retry pure
 
--- | How the thread has ended, if it has.
-threadEndSoFar :: Thread a -> STM (Maybe (Either SomeException a))
+-- | What the thread has published, if it has ended.
+threadEndSoFar :: Thread r -> STM (Maybe r)
 threadEndSoFar = STM.readTVar . threadResult
 
 -- | The same, at a glance.
-threadEndNow :: Thread a -> IO (Maybe (Either SomeException a))
+threadEndNow :: Thread r -> IO (Maybe r)
 threadEndNow = STM.readTVarIO . threadResult
 
 -- | Starts a thread in which the action runs unmasked, whatever the caller's
--- masking state. Call it masked, or the thread may be lost before it is returned.
-start :: Label -> IO a -> IO (Thread a)
-start = startThen (\_ -> pure ())
+-- masking state, and which publishes how that ended. Call it masked, or the thread may be
+-- lost before it is returned.
+start :: Label -> IO a -> IO (Thread (Either SomeException a))
+start = startWith pure (\_ -> pure ())
 {-# INLINE start #-}
 
--- | The same; as it is known how the thread has ended, the given is done in the same
--- transaction.
+-- | The same, but the thread publishes what the first function, which runs in it and masked,
+-- makes of how the action ended. The second function is done in the same transaction.
 --
 -- (What is inlined here, and what is not, is so that the switch costs nothing.)
-startThen :: (Either SomeException a -> STM ()) -> Label -> IO a -> IO (Thread a)
-startThen then' label act = inSimulation (startReally then' label act) (startSimulated then' label act)
-{-# INLINE startThen #-}
+startWith :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
+startWith finish hook label act = inSimulation (startReally finish hook label act) (startSimulated finish hook label act)
+{-# INLINE startWith #-}
 
-startReally :: (Either SomeException a -> STM ()) -> Label -> IO a -> IO (Thread a)
-startReally then' label act = do
+startReally :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
+startReally finish hook label act = do
   result <- STM.newTVarIO Nothing
   add threads 1
   -- Forked masked: an exception cannot strike before 'try' is in place, nor
   -- between the end of the action and the publication of how it ended.
   thread <- forkIOWithUnmask $ \unmask -> do
-    end <- life tell label (unmask act)
-    STM.atomically (STM.writeTVar result (Just end) >> then' end)
+    end <- life tell label (unmask act) >>= finish
+    STM.atomically (STM.writeTVar result (Just end) >> hook end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
 
-startSimulated :: (Either SomeException a -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread a)
-startSimulated then' label act simulation = do
+startSimulated :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread r)
+startSimulated finish hook label act simulation = do
   result <- STM.newTVarIO Nothing
   let report event = tell event >> record simulation event
-  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> act))) $ \end ->
-    STM.writeTVar result (Just end) >> then' end
+  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> act)) >>= finish) $ \end ->
+    STM.writeTVar result (Just end) >> hook end
   add threads 1
   pure (Thread thread result)
 {-# NOINLINE startSimulated #-}

@@ -10,8 +10,11 @@
 -- 1. What was started has ended, cleanup included, before the operator returns or
 --    throws; nothing orphans it, not even a second cancellation.
 -- 2. What has to stop is asked all at once, then waited for.
--- 3. The outcome is the first that there is of: the caller's cancellation, the
---    leftmost fault, the operator's verdict.
+-- 3. The outcome is the first that there is of: what was thrown at the caller from
+--    outside, the leftmost fault, the operator's verdict.
+--
+-- Users' code runs in branches, or where an operator catches what it throws. So an exception
+-- that reaches 'structured' was thrown at the caller from outside, whatever its type.
 module Behavior.Internal.Scope
   ( -- * Scopes
     Scope
@@ -27,7 +30,6 @@ module Behavior.Internal.Scope
   , branch
   , branchThen
   , worker
-  , successor
   , forget
   , ask
   , askWithoutWaiting
@@ -40,14 +42,18 @@ module Behavior.Internal.Scope
   , StoppedWithFault (..)
   ) where
 
-import Control.Concurrent (ThreadId)
+import Control.Concurrent (ThreadId, myThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception
-  ( Exception (..)
+  ( BlockedIndefinitelyOnMVar (..)
+  , BlockedIndefinitelyOnSTM (..)
+  , Exception (..)
+  , SomeAsyncException (..)
   , SomeException (..)
   , asyncExceptionFromException
   , asyncExceptionToException
   , catch
+  , evaluate
   , mask
   , mask_
   , onException
@@ -59,7 +65,7 @@ import Control.Monad (foldM, when)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
-import Behavior.Internal.Failure (isCancellation, isFailure)
+import Behavior.Internal.Failure (BehaviorFailed (..), isFailure)
 import Behavior.Internal.Runtime
 
 -- | The branches that an operator has started, newest first. Only the operator's
@@ -68,7 +74,7 @@ newtype Scope = Scope (IORef [SomeBranch])
 
 -- | A behaviour that runs in a thread of its own on behalf of an operator.
 data Branch a = Branch
-  { branchThread :: {-# UNPACK #-} !(Thread a)
+  { branchThread :: {-# UNPACK #-} !(Thread (Outcome a))
   , branchAsked :: {-# UNPACK #-} !(IORef Bool)
   -- ^ Whether it was asked to stop: nobody is asked twice, for the second
   -- request would interrupt the cleanup that the first one began.
@@ -76,12 +82,12 @@ data Branch a = Branch
 
 -- | How the branch ended; retries until it has.
 outcome :: Branch a -> STM (Outcome a)
-outcome b = ending b <$> threadEnd (branchThread b)
+outcome = threadEnd . branchThread
 
 -- | How the branch ended, if it has. (To ask several branches so, one after the other, is
 -- the same as 'orElse' between their outcomes, without its nested transactions.)
 outcomeSoFar :: Branch a -> STM (Maybe (Outcome a))
-outcomeSoFar b = fmap (ending b) <$> threadEndSoFar (branchThread b)
+outcomeSoFar = threadEndSoFar . branchThread
 
 branchId :: Branch a -> ThreadId
 branchId = threadId . branchThread
@@ -109,14 +115,23 @@ structured body = mask $ \restore -> do
   verdict <- try (restore (pure scope >>= body))
   faults <- end scope
   case (verdict, faults) of
-    (Left e, []) | isCancellation e -> throwIO e
-    (Left e, fault : _) | isCancellation e -> throwIO (StoppedWithFault e fault)
-    -- A cancellation that came while the branches were stopping arrives here, and
+    (Left e, _) | not (isDeadlock e) -> case faults of
+      [] -> throwIO e
+      fault : _ -> throwIO (StoppedWithFault e fault)
+    -- What was thrown at the caller while the branches were stopping arrives here, and
     -- not when the outcome has been thrown into some handler of the caller's.
     (_, []) -> restore checkpoint >> either throwIO id verdict
     (_, fault : _) -> do
-      restore checkpoint `catch` \cancellation -> throwIO (StoppedWithFault cancellation fault)
+      restore checkpoint `catch` \e -> throwIO (StoppedWithFault e fault)
       throwIO fault
+
+-- | Whether GHC threw it because the thread waits for what will never come. It throws that to
+-- a branch and to the operator that waits for it alike, so a fault of the branch comes first.
+isDeadlock :: SomeException -> Bool
+isDeadlock e = case (fromException e, fromException e) of
+  (Just BlockedIndefinitelyOnSTM, _) -> True
+  (_, Just BlockedIndefinitelyOnMVar) -> True
+  _ -> False
 
 -- | Stops everything in the scope, and gives the faults from left to right.
 end :: Scope -> IO [SomeException]
@@ -136,25 +151,16 @@ end (Scope branches) = do
 branch :: Scope -> Label -> IO a -> IO (Branch a)
 branch = branchThen (\_ -> pure ())
 
--- | The same; as it is known how the branch has ended, the given is done in the same
--- transaction. (It is told that it completed, or what it threw.)
-branchThen :: (Either SomeException a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
-branchThen then' scope label act = launch scope (\_ -> startThen then' label act)
+-- | The same; in the transaction that publishes how the branch ended, the given is done too.
+branchThen :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
+branchThen hook scope label act = launch scope (\_ -> startWith classified hook label act)
 
 -- | Starts a branch that can see whether it was asked to stop. One that runs a
 -- user's action in a loop must look: the action may have swallowed the request.
 worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-worker scope label act = launch scope (start label . act)
+worker scope label act = launch scope (startWith classified (\_ -> pure ()) label . act)
 
--- | Starts a worker that goes on for a branch that has ended, in its place: what is
--- left and right of it stays so.
-successor :: Scope -> Branch b -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-successor scope@(Scope branches) old label act = mask_ $ do
-  new <- worker scope label act
-  modifyIORef' branches (instead old [SomeBranch new] . drop 1)
-  pure new
-
-launch :: Scope -> (IO Bool -> IO (Thread a)) -> IO (Branch a)
+launch :: Scope -> (IO Bool -> IO (Thread (Outcome a))) -> IO (Branch a)
 launch (Scope branches) starting = mask_ $ do
   asked <- newIORef False
   thread <- starting (readIORef asked)
@@ -165,16 +171,12 @@ launch (Scope branches) starting = mask_ $ do
 -- | Takes a branch that has ended, and did not fault, out of the scope, which
 -- otherwise would grow with every branch that an operator ever started.
 forget :: Scope -> Branch a -> IO ()
-forget (Scope branches) old = modifyIORef' branches (instead old [])
-
--- | The branches, with these in place of one.
-instead :: Branch a -> [SomeBranch] -> [SomeBranch] -> [SomeBranch]
-instead old new = without
+forget (Scope branches) old = modifyIORef' branches without
  where
   -- Strict: an unevaluated list would hold on to what was taken out of it.
   without [] = []
   without (SomeBranch b : others)
-    | branchId b == branchId old = new ++ others
+    | branchId b == branchId old = others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
 -- | Asks branches (the newest first) to stop, all at once: none hears it later because
@@ -223,7 +225,7 @@ ended b = unlessAtAGlance (outcomeNow b) (atomically (outcome b))
 
 -- | How the branch has ended, if it has, at a glance.
 outcomeNow :: Branch a -> IO (Maybe (Outcome a))
-outcomeNow b = fmap (ending b) <$> threadEndNow (branchThread b)
+outcomeNow = threadEndNow . branchThread
 
 -- | What the branch has returned, if it has.
 completedNow :: Branch a -> IO (Maybe a)
@@ -241,17 +243,30 @@ result = \case
   Faulted e -> Left e
   Stopped e -> Left e
 
--- | How a branch ended whose thread ended so.
-ending :: Branch a -> Either SomeException a -> Outcome a
-ending b = \case
-  Right a -> Completed a
-  Left e
-    | isOwnStop e -> Stopped e
-    | Just (StoppedWithFault cause fault) <- fromException e, isOwnStop cause -> Faulted fault
-    | isFailure e -> Failing e
-    | otherwise -> Faulted e
+-- | How a branch ended whose action ended so. It is called in the branch's own thread: an
+-- exception may itself be undefined, and to look at it throws, which must happen to no
+-- operator that still has branches. What that throws is the fault.
+classified :: Either SomeException a -> IO (Outcome a)
+classified = \case
+  Right a -> pure (Completed a)
+  Left e -> do
+    self <- myThreadId
+    try (evaluate (kind self (forced e))) >>= either (fmap Faulted . defined) pure
  where
-  isOwnStop cause = fromException cause == Just (stopping b)
+  kind self e
+    | isStopOf self e = Stopped e
+    | Just (StoppedWithFault cause fault) <- fromException e, isStopOf self cause = Faulted $! forced fault
+    | isFailure e = Failing e
+    | otherwise = Faulted e
+  isStopOf self cause = fromException cause == Just (Stop self)
+  defined e = try (evaluate (forced e)) >>= either defined pure
+
+-- | The exception; all that handlers match on is evaluated with it.
+forced :: SomeException -> SomeException
+forced e@(SomeException inner)
+  | Just (BehaviorFailed failure) <- fromException e = failure `seq` e
+  | Just (SomeAsyncException cancellation) <- fromException e = cancellation `seq` e
+  | otherwise = inner `seq` e
 
 -- | How an operator asks a branch to stop. It names the thread it is meant for: a
 -- request that strays into another thread is not mistaken for that one's own.
@@ -275,9 +290,9 @@ instance Exception Stop where
 --
 -- @since 0.1.0.0
 data StoppedWithFault = StoppedWithFault
-  { stoppedBy :: SomeException
+  { stoppedBy :: !SomeException
   -- ^ The cancellation.
-  , stoppedFault :: SomeException
+  , stoppedFault :: !SomeException
   -- ^ The leftmost fault of the behaviours that it stopped.
   }
 

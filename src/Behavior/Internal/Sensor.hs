@@ -44,65 +44,61 @@ import Behavior.Internal.Source
 --
 -- @since 0.1.0.0
 polling :: Seconds -> Behavior a -> Signal a
-polling every act = Signal $ do
+polling every act = Signal $ \demand -> do
   _ <- period "polling" every
-  views <- newTVarIO (0 :: Int) -- how many were asked for
-  newest <- newTVarIO Nothing -- the reading last told, and how many views there were when it began
+  views <- newTVarIO (0 :: Int) -- how many were asked for: a reading's generation is how many it came after
+  newest <- newTVarIO Nothing -- the reading last published, and its generation
   next <- newIORef (-1 / 0) -- when the next reading may begin
-  underWay <- newTVarIO Nothing -- the slot of the reading that is under way
-  telling <- newIORef False -- whether somebody wants to know of that
-  same <- newIORef (\_ _ -> False)
-  let -- Makes a first reading, and gives those that follow.
-      readFirst asked = do
-        tells <- readIORef telling
-        isSame <- readIORef same
-        let readOn told asked' = do
-              t <- now
-              slot <- sleepToSlot every t . notBefore t =<< readIORef next
-              readAt slot told asked' >>= maybe (pure ()) (`readOn` asked')
-            -- Gives what is told of the sensor now, if somebody still wants it.
-            readAt slot told asked' = do
-              writeIORef next $! slot + every
-              when tells $ atomically (writeTVar underWay (Just slot))
-              asking <- readTVarIO views
-              read' <- trySynchronous act
-              stopping <- asked'
-              if stopping
-                then -- The reading is not wanted any more, and may have swallowed the
-                -- request to stop. A fault of its cleanup is not lost.
-                  either throwIO (const (pure Nothing)) read'
-                else do
-                  isNews <- case (told, read') of
-                    -- (Who asked for a view meanwhile wants to hear it, whatever it is.)
-                    (Told asking' old, Right new) | asking == asking' -> differs old new
-                    _ -> pure True
-                  when (isNews || tells) . atomically $ do
-                    when isNews (writeTVar newest (Just (asking, read')))
-                    when tells (writeTVar underWay Nothing)
-                  pure $! Just $! if isNews then either (const Untold) (Told asking) read' else told
-            differs old new = either (const True) not <$> trySynchronous (evaluate (isSame old new))
+  inFlight <- newTVarIO Nothing -- the slot of the reading that is in flight
+  let readings stopRequested = do
         t <- now
-        slot <- sleepToSlot every t . max t =<< readIORef next
-        maybe (\_ -> pure ()) readOn <$> readAt slot Untold asked
-      notBefore t slot
+        slot <- max t <$> readIORef next
+        readFrom slot Unpublished
+       where
+        readFrom due published = do
+          t <- now
+          slot <- sleepToSlot every t due
+          writeIORef next $! slot + every
+          when (readingTimes demand) $ atomically (writeTVar inFlight (Just slot))
+          generation <- readTVarIO views
+          read' <- trySynchronous act
+          stopping <- stopRequested
+          if stopping
+            then -- The reading is not wanted any more, and may have swallowed the stop
+            -- request. A fault of its cleanup is not lost.
+              either throwIO (const (pure ())) read'
+            else do
+              changed <- case (published, read') of
+                -- (A view that was asked for meanwhile waits for this reading, whatever it is.)
+                (Published generation' old, Right new) | generation == generation' -> differs old new
+                _ -> pure True
+              when (changed || readingTimes demand) . atomically $ do
+                when changed (writeTVar newest (Just (generation, read')))
+                when (readingTimes demand) (writeTVar inFlight Nothing)
+              now >>= \t' -> readFrom (slotAfter t' (slot + every)) $! case read' of
+                _ | not changed -> published
+                Left _ -> Unpublished
+                Right new -> Published generation new
+      differs old new = either (const True) not <$> trySynchronous (evaluate (sameFor demand old new))
+      -- The slot, or if that has been missed the next one.
+      slotAfter t slot
         | slot >= t = slot
         | otherwise = slot + every * fromInteger (ceiling ((t - slot) / every))
   pure
     Source
-      { workers = [Reader "polling" (readFirst <$ writeTVar underWay Nothing)]
+      { workers = [Worker "polling" (readings <$ writeTVar inFlight Nothing)]
       , view = do
           n <- (+ 1) <$> readTVar views
           writeTVar views n
           pure . always $
             readTVar newest >>= \case
-              Just (asking, read') | asking >= n -> either throwSTM pure read'
+              Just (generation, read') | generation >= n -> either throwSTM pure read'
               _ -> retry
-      , reading = writeIORef telling True >> pure (readTVar underWay)
-      , alike = writeIORef same
+      , inFlightSince = readTVar inFlight
       }
 
--- | What was last told of a sensor, and how many views had been asked for when it was read.
-data Told a = Untold | Told !Int a
+-- | What was last published of a sensor, and its generation.
+data Published a = Unpublished | Published !Int a
 
 -- | Fails the operator when a polled reading of the signal takes longer than so
 -- many seconds (more than zero).
@@ -117,22 +113,21 @@ data Told a = Untold | Told !Int a
 --
 -- @since 0.1.0.0
 staleAfter :: Seconds -> Signal a -> Signal a
-staleAfter limit signal = Signal $ do
+staleAfter limit signal = Signal $ \demand -> do
   _ <- period "staleAfter" limit
-  source <- open signal
-  current <- reading source
+  source <- open signal demand {readingTimes = True}
   -- Odd while a reading is overdue, and higher whenever one has been: so a view
   -- also fails for one that is over by the time it looks.
   overdue <- newTVarIO (0 :: Int)
   let watchdog = forever $ do
-        since <- atomically (current >>= maybe retry pure)
+        since <- atomically (inFlightSince source >>= maybe retry pure)
         sleepUntil (since + limit)
         isOverdue <- atomically $ do
-          still <- (== Just since) <$> current
+          still <- (== Just since) <$> inFlightSince source
           when still (modifyTVar' overdue (+ 1))
           pure still
         when isOverdue . atomically $ do
-          still <- (== Just since) <$> current
+          still <- (== Just since) <$> inFlightSince source
           when still retry
           calm
       calm = modifyTVar' overdue (\n -> if odd n then n + 1 else n)

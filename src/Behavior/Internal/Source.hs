@@ -6,31 +6,33 @@ module Behavior.Internal.Source
   ( -- * Signals
     Signal (..)
   , watching
-  , distinct
   , withShared
+
+    -- * Opening
+  , Demand (..)
+  , anything
+  , on
+  , suppressEqual
 
     -- * Sources
   , Source (..)
   , viewing
   , View (..)
+  , Look (..)
+  , lookAt
   , always
   , looking
 
     -- * What must run for them
   , Worker (..)
-  , ceaseless
-  , startWorkers
   , Sensors
   , startSensors
-  , goOn
-  , sensorBranches
-  , lost
+  , diedOf
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, finally)
 import Control.Monad (when)
-import Data.Function (on)
 import Data.Traversable (for)
 
 import Behavior.Internal.Failure (Behavior, failWith)
@@ -55,53 +57,72 @@ import Behavior.Internal.Scope
 -- A change that comes and goes between two looks is not seen.
 --
 -- @since 0.1.0.0
-newtype Signal a = Signal {open :: IO (Source a)}
+newtype Signal a = Signal {open :: Demand a -> IO (Source a)}
 
 instance Functor Signal where
-  fmap f (Signal opening) = Signal (fmap (fmap f) opening)
+  fmap f signal = Signal $ \demand -> fmap f <$> open signal (demand `on` f)
 
 instance Applicative Signal where
-  pure a = Signal (pure (pure a))
-  Signal f <*> Signal a = Signal ((<*>) <$> f <*> a)
+  pure a = Signal (\_ -> pure (pure a))
+  f <*> a = Signal $ \demand ->
+    (<*>) <$> open f anything {readingTimes = readingTimes demand} <*> open a anything {readingTimes = readingTimes demand}
 
--- | A signal that somebody has opened, for one run of an operator.
+-- | What a consumer needs of a source.
+data Demand a = Demand
+  { sameFor :: a -> a -> Bool
+  -- ^ Which values it need not tell apart: a reading that is the same as the one before may
+  -- be suppressed.
+  , readingTimes :: Bool
+  -- ^ Whether it looks at 'inFlightSince'.
+  }
+
+-- | To be given every value, and nothing else.
+anything :: Demand a
+anything = Demand {sameFor = \_ _ -> False, readingTimes = False}
+
+-- | The demand that a consumer of the function's results has on its arguments.
+on :: Demand b -> (a -> b) -> Demand a
+on demand f = demand {sameFor = \a b -> sameFor demand (f a) (f b)}
+
+-- | The signal with equal consecutive values suppressed, where that saves something.
+suppressEqual :: Eq a => Signal a -> Signal a
+suppressEqual signal = Signal $ \demand -> open signal demand {sameFor = (==)}
+
+-- | A signal that was opened, for one run of an operator.
 data Source a = Source
   { workers :: [Worker]
   -- ^ What must run while the source is looked at.
   , view :: STM (View a)
   -- ^ A view of the values that are read from this moment on.
-  , reading :: IO (STM (Maybe Seconds))
-  -- ^ Asks to be told when the oldest reading began that is under way; before any worker
-  -- is started.
-  , alike :: (a -> a -> Bool) -> IO ()
-  -- ^ Says which values are alike to all who look, before any worker is started: then nobody
-  -- need hear of a reading that is like the last one.
+  , inFlightSince :: STM (Maybe Seconds)
+  -- ^ When the oldest reading began that is in flight, if that was demanded.
   }
 
--- | The source that gives this view, and all by itself.
+-- | The source that gives this view, and needs no worker.
 viewing :: STM (View a) -> Source a
-viewing it = Source {workers = [], view = it, reading = pure (pure Nothing), alike = \_ -> pure ()}
+viewing it = Source {workers = [], view = it, inFlightSince = pure Nothing}
 
 instance Functor Source where
-  fmap f source = source {view = fmap f <$> view source, alike = \same -> alike source (same `on` f)}
+  fmap f source = source {view = fmap f <$> view source}
 
 instance Applicative Source where
   pure = viewing . pure . pure
   f <*> a =
-    (viewing ((<*>) <$> view f <*> view a))
-      { workers = map (uncurry Worker . ceaseless) (workers f ++ workers a)
-      , reading = (\s t -> earliest <$> s <*> t) <$> reading f <*> reading a
+    Source
+      { workers = workers f ++ workers a
+      , view = (<*>) <$> view f <*> view a
+      , inFlightSince = earliest <$> inFlightSince f <*> inFlightSince a
       }
    where
     earliest (Just s) (Just t) = Just (min s t)
     earliest s Nothing = s
     earliest Nothing t = t
 
--- | How to look at a value. Who looks throws when there is none any more.
+-- | How to look at a value. To look throws when there is none any more.
 data View a = View
-  { atFirst :: !(STM a)
+  { firstRead :: !(STM a)
   -- ^ For the first time: waits for a value, however long that takes to come.
-  , later :: !(STM a)
+  , reread :: !(STM a)
   -- ^ After that: a value that is not there has been lost.
   }
 
@@ -112,6 +133,13 @@ instance Applicative View where
   pure = always . pure
   View f f' <*> View a a' = View (f <*> a) (f' <*> a')
 
+-- | Whether the operator has had a value before.
+data Look = FirstRead | Reread
+
+lookAt :: Look -> View a -> STM a
+lookAt FirstRead = firstRead
+lookAt Reread = reread
+
 -- | To look the same way each time.
 always :: STM a -> View a
 always value = View value value
@@ -121,21 +149,13 @@ looking :: (STM a -> STM b) -> View a -> View b
 looking f (View a a') = View (f a) (f a')
 {-# INLINE looking #-}
 
--- | A thread that a source needs while it is looked at. It runs until it is asked to stop,
--- and can see whether it was. It may be started again after a pause; the transaction
--- prepares each start.
-data Worker
-  = -- | Its name, and what it does.
-    Worker String (STM (IO Bool -> IO ()))
-  | -- | One that makes a first reading, upon which the source has a value, and returns how
-    -- to go on from there.
-    Reader String (STM (IO Bool -> IO (IO Bool -> IO ())))
-
--- | The worker's name, and all that it does.
-ceaseless :: Worker -> (String, STM (IO Bool -> IO ()))
-ceaseless = \case
-  Worker name run -> (name, run)
-  Reader name once -> (name, (\run asked -> run asked >>= ($ asked)) <$> once)
+-- | A thread that a source needs while it is looked at. It runs until its stop is requested,
+-- and can see whether it was. It may be started again after a pause.
+data Worker = Worker
+  { workerName :: String
+  , prepared :: STM (IO Bool -> IO ())
+  -- ^ Prepares one start, and gives what is then to run.
+  }
 
 -- | The value that a transaction gives: event-driven. It reacts to the very
 -- transaction that changes the value, and costs nothing while nothing changes.
@@ -150,15 +170,9 @@ ceaseless = \case
 --
 -- @since 0.1.0.0
 watching :: STM a -> Signal a
-watching transaction = Signal . pure . viewing . pure $ View transaction (transaction `orElse` noneAnyMore)
+watching transaction = Signal . const . pure . viewing . pure $ View transaction (transaction `orElse` noneAnyMore)
  where
   noneAnyMore = failWith "the signal has no value any more"
-
--- | The signal, for who does not mind if he is not told the same value twice.
-distinct :: Eq a => Signal a -> Signal a
-distinct signal = Signal $ do
-  source <- open signal
-  source <$ alike source (==)
 
 -- | Opens the sources of a signal once, for all its occurrences in a behaviour.
 --
@@ -178,85 +192,48 @@ distinct signal = Signal $ do
 -- @since 0.1.0.0
 withShared :: Signal a -> (Signal a -> Behavior b) -> Behavior b
 withShared signal body = do
+  -- (A consumer that looks at the times of readings may come later.)
+  source <- open signal anything {readingTimes = True}
   closed <- newTVarIO False
-  -- It closes only when all have ended: of those who are still being stopped, some
-  -- may just be looking.
-  structured (sharing closed) `finally` atomically (writeTVar closed True)
+  -- It closes only when all have ended: some of those that are still stopping may be looking
+  -- just then.
+  structured (sharing source closed) `finally` atomically (writeTVar closed True)
  where
-  sharing closed scope = do
-    source <- open signal
-    underWay <- reading source -- Somebody may ask later.
-    others <- newEmptyTMVarIO
-    let shared = Signal $ do
+  sharing source closed scope = do
+    sensors <- newEmptyTMVarIO
+    let shared = Signal $ \_ -> do
           atomically stillOpen
-          running <- atomically (readTMVar others)
-          let attended value = stillOpen >> anyLost running >>= maybe value throwSTM
-          pure (viewing (looking attended <$> view source)) {reading = pure underWay}
+          running <- atomically (readTMVar sensors)
+          let attended value = stillOpen >> diedOf running >>= maybe value throwSTM
+          pure source {workers = [], view = looking attended <$> view source}
         stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
     -- The body comes first, so that its fault is the leftmost.
     main <- branch scope (Label "withShared" "body") (body shared)
-    (_, running) <- startWorkers scope "withShared" source
-    atomically (putTMVar others running)
+    (_, running) <- startSensors scope "withShared" source
+    atomically (putTMVar sensors running)
     settle <$> atomically (outcome main)
   closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"
 
+-- | The threads that run for a source, from left to right.
+type Sensors = [Branch ()]
+
 -- | Starts what must run while the source is looked at, and gives a view of it. The
--- view comes first, and so do those of the workers: else they might just miss the
+-- view comes first, and so do those of the workers: otherwise they could just miss the
 -- first reading, and wait for a second one.
-startWorkers :: Scope -> String -> Source a -> IO (View a, [Branch ()])
-startWorkers scope operator source = case map ceaseless (workers source) of
-  [] -> (\seen -> (seen, [])) <$> atomically (view source)
-  needed -> do
-    (works, seen) <- atomically ((,) <$> traverse sequenceA needed <*> view source)
-    running <- for works $ \(name, run) -> worker scope (Label operator name) run
-    (seen, running) <$ giveWay
-
--- | What reads for an operator.
-data Sensors
-  = Reading [Branch ()]
-  | -- | A thread that ends with its first reading. Who needs no other saves the stop of a
-    -- thread that sleeps, which is dearer than its start.
-    ReadingOnce Label (Branch (IO Bool -> IO ()))
-
--- | 'startWorkers', but a single sensor makes one reading, until it has to 'goOn'.
 startSensors :: Scope -> String -> Source a -> IO (View a, Sensors)
 startSensors scope operator source = case workers source of
-  [] -> (\seen -> (seen, Reading [])) <$> atomically (view source)
-  [Reader name once] -> do
-    (run, seen) <- atomically ((,) <$> once <*> view source)
-    let label = Label operator name
-    reader <- worker scope label run
-    (seen, ReadingOnce label reader) <$ giveWay
-  _ -> fmap Reading <$> startWorkers scope operator source
+  [] -> (\seen -> (seen, [])) <$> atomically (view source)
+  needed -> do
+    (runs, seen) <- atomically ((,) <$> traverse prepared needed <*> view source)
+    running <- for (zip needed runs) $ \(w, run) -> worker scope (Label operator (workerName w)) run
+    (seen, running) <$ giveWay
 
--- | Has them read until they are stopped. Call it when a first reading has been told.
-goOn :: Scope -> Sensors -> IO Sensors
-goOn scope = \case
-  ReadingOnce label reader ->
-    ended reader >>= \case
-      Completed run -> do
-        running <- successor scope reader label run
-        pure (Reading [running])
-      _ -> pure (ReadingOnce label reader)
-  running -> pure running
-
--- | The threads that read.
-sensorBranches :: Sensors -> [SomeBranch]
-sensorBranches = \case
-  Reading running -> map SomeBranch running
-  ReadingOnce _ reader -> [SomeBranch reader]
-
--- | What one of them has died of, if it has, the leftmost first. (One that was asked to stop
--- has not.)
-lost :: Sensors -> STM (Maybe SomeException)
-lost = \case
-  Reading running -> anyLost running
-  ReadingOnce _ reader -> anyLost [reader]
-
-anyLost :: [Branch a] -> STM (Maybe SomeException)
-anyLost = foldr orLost (pure Nothing)
+-- | What one of them has died of, if it has, the leftmost first. (One whose stop was
+-- requested has not.)
+diedOf :: Sensors -> STM (Maybe SomeException)
+diedOf = foldr orDied (pure Nothing)
  where
-  orLost sensor others = outcomeSoFar sensor >>= maybe others (pure . Just) . (>>= cause)
+  orDied sensor others = outcomeSoFar sensor >>= maybe others (pure . Just) . (>>= cause)
   cause = \case
     Failing e -> Just e
     Faulted e -> Just e

@@ -65,7 +65,7 @@ instance Exception TimedOut where
 
 -- | False until so many seconds have passed since it was opened.
 elapsed :: Seconds -> Signal Bool
-elapsed seconds = Signal $ do
+elapsed seconds = Signal $ \_ -> do
   over <- newTVarIO (seconds <= 0)
   deadline <- (+ seconds) <$> now
   let clock = sleepUntil deadline >> atomically (writeTVar over True)

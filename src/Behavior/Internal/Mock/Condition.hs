@@ -134,7 +134,7 @@ upToDate c transaction = do
 --
 -- @since 0.1.0.0
 signal :: Condition a -> Signal a
-signal c = Signal $ do
+signal c = Signal $ \_ -> do
   changesByItself <- upToDate c (\_ _ -> (,) . not . null <$> readTVar (ahead c) <*> pure [])
   -- A clock that was stopped for a while has slept through changes: until it has made
   -- them, nobody may look.

@@ -1,0 +1,198 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- What is thrown at the caller of an operator from outside, of a synchronous type (as by
+-- @throwTo main (ExitFailure 3)@ in a signal handler); and what users' code throws in the
+-- operator's own thread, or as an exception that is itself undefined.
+module Behavior.FromOutsideSpec (spec) where
+
+import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM (newTVarIO, readTVar, throwSTM, writeTVar)
+import Control.Exception
+import Control.Monad (void)
+import Data.Foldable (for_)
+import System.Exit (ExitCode (..))
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Internal.Runtime (atomically)
+import Behavior.Parallel (allOf, firstOf, scoped)
+import Behavior.Signal (Signal)
+import qualified Behavior.Signal as Signal
+import Behavior.Time (timeout)
+import Support hiding (End (..))
+
+spec :: Spec
+spec = guarded $ do
+  describe "What is thrown at the caller from outside, of a synchronous type," thrownAtTheCaller
+  describe "Users' code in the operator's thread" usersCode
+  describe "An exception that is itself undefined" undefinedExceptions
+
+-- | Each operator, as it runs a branch that goes on until it is stopped.
+operators :: [(String, Behavior String -> Behavior String)]
+operators =
+  [ ("parallel", \act -> "" <$ parallel act hang)
+  , ("both", \act -> "" <$ both act hang)
+  , ("firstOf", \act -> firstOf [hang, act])
+  , ("allOf", \act -> concat <$> allOf [act, hang])
+  , ("scoped", scoped . const)
+  , ("withShared", Signal.withShared (pure True) . const)
+  , ("timeout", timeout 3600)
+  , ("whileHolding", Signal.whileHolding (pure True))
+  , ("switch", Signal.switch (pure 'k') . const)
+  , ("teleoReactive", \act -> Signal.teleoReactive [(pure True, act)])
+  , ("rSelect", \act -> Signal.rSelect (pure True) act (pure ""))
+  , ("monitor", Signal.monitor (pure False) (pure ()))
+  , ("monitor (its recovery)", \act -> Signal.monitor (pure True) (void act) (pure ""))
+  , ("rSelect, polled", \act -> rSelect (pure True) act (pure ""))
+  , ("monitor, polled", monitor (pure False) (pure ()))
+  ]
+
+-- | What a branch does when it is stopped.
+data Stopping = Stops | Completes | Fails | Faults
+  deriving (Bounded, Enum, Eq, Show)
+
+thrownAtTheCaller :: Spec
+thrownAtTheCaller = do
+  for_ operators $ \(name, operator) ->
+    for_ [minBound ..] $ \stopping -> do
+      it (name ++ ": gets out, though its branch " ++ manner stopping) $ do
+        end <- hit (operator . endingBy stopping)
+        end `shouldBe` expected stopping
+      it (name ++ ": is not caught by ?, though its branch " ++ manner stopping) $ do
+        end <- hit (\entered -> operator (endingBy stopping entered) ? pure "goes on!")
+        end `shouldBe` expected stopping
+
+  it "waitUntil: gets out" $ do
+    end <- launching (Signal.waitUntil (pure False)) $ \caller -> do
+      awaitIdle (asyncThreadId caller)
+      throwing (asyncThreadId caller) (ExitFailure 3)
+      awaitEnd caller
+    end `shouldBe` FaultedWith "ExitFailure 3"
+ where
+  hit act = do
+    entered <- newGate
+    launching (act entered) $ \caller -> do
+      pass entered
+      throwing (asyncThreadId caller) (ExitFailure 3)
+      awaitEnd caller
+  endingBy stopping entered =
+    (open entered >> hang) `catch` \e -> case stopping of
+      Stops -> throwIO (e :: SomeException)
+      Completes -> pure "completed"
+      Fails -> failWith "the arm did not park"
+      Faults -> throwIO (Fault "a cleanup")
+  manner = \case
+    Stops -> "stops"
+    Completes -> "completes all the same"
+    Fails -> "fails while it stops"
+    Faults -> "faults while it stops"
+  expected = \case
+    Faults -> CancelledWithFault "ExitFailure 3" (show (Fault "a cleanup"))
+    _ -> FaultedWith "ExitFailure 3"
+
+usersCode :: Spec
+usersCode = do
+  for_ followers $ \(name, follower) -> do
+    it (name ++ ": a view that throws stops the branch, then ends the operator") $ do
+      broken <- newTVarIO False
+      let signal = Signal.watching (readTVar broken >>= \is -> if is then throwSTM (Fault "view") else pure True)
+      stoppedFirst follower signal (atomically (writeTVar broken True)) (FaultedWith (show (Fault "view")))
+    it (name ++ ": a function on a signal that throws stops the branch, then ends the operator") $ do
+      level <- newTVarIO (0 :: Int)
+      let signal = (\n -> n == 0 || throw (Fault "function")) <$> Signal.watching (readTVar level)
+      stoppedFirst follower signal (atomically (writeTVar level 1)) (FaultedWith (show (Fault "function")))
+  it "switch: an equality that throws stops the branch, then ends the operator" $ do
+    level <- newTVarIO (Key 0)
+    stoppedFirst
+      (\signal act -> Signal.switch signal (const act))
+      (Signal.watching (readTVar level))
+      (atomically (writeTVar level (Key 1)))
+      (FaultedWith (show (Fault "equality")))
+  it "firstOf, allOf: a list that ends in an error starts nothing" $ do
+    book <- newNotebook
+    for_ [firstOf, void . allOf] $ \operator ->
+      ending (operator (note book "started" : throw (Fault "list"))) `shouldReturn` FaultedWith (show (Fault "list"))
+    notes book `shouldReturn` []
+ where
+  followers =
+    [ ("whileHolding", Signal.whileHolding)
+    , ("rSelect", \signal act -> Signal.rSelect signal act (pure ()))
+    , ("monitor", \signal -> Signal.monitor (not <$> signal) (pure ()))
+    , ("switch", \signal -> Signal.switch signal . const)
+    , ("teleoReactive", \signal act -> Signal.teleoReactive [(signal, act)])
+    ] :: [(String, Signal Bool -> Behavior () -> Behavior ())]
+
+-- | Runs the operator; its cleanup is over when the operator ends so.
+stoppedFirst :: (Signal k -> Behavior () -> Behavior ()) -> Signal k -> IO () -> Ending () -> IO ()
+stoppedFirst follower signal breakIt expected = do
+  entered <- newGate
+  book <- newNotebook
+  end <- launching (follower signal ((open entered >> hang) `uninterruptibly` note book "cleaned up")) $ \caller -> do
+    pass entered
+    breakIt
+    awaitEnd caller
+  end `shouldBe` expected
+  notes book `shouldReturn` ["cleaned up"]
+
+-- | One that is not to be compared with others.
+newtype Key = Key Int
+
+instance Eq Key where
+  Key a == Key b
+    | a == b = True
+    | otherwise = throw (Fault "equality")
+
+undefinedExceptions :: Spec
+undefinedExceptions = do
+  for_ exceptions $ \(kind, bottom) -> do
+    for_ several $ \(name, operator) ->
+      it (name ++ ", " ++ kind ++ ": ends as a fault, after the other branch's cleanup") $
+        beside bottom operator
+    it ("withShared, " ++ kind ++ ": ends as a fault, after its sensor has ended") $ do
+      reading <- newGate
+      book <- newNotebook
+      let sensor = Signal.polling 0.001 ((open reading >> hang) `uninterruptibly` note book "cleaned up")
+      ending (Signal.withShared sensor (\_ -> pass reading >> bottom)) `shouldReturn` FaultedWith "undefined"
+      notes book `shouldReturn` ["cleaned up"]
+    it ("monitor, " ++ kind ++ ": of the task while it stops, comes after the recovery") $ do
+      condition <- newTVarIO False
+      entered <- newGate
+      book <- newNotebook
+      end <- launching (Signal.monitor (Signal.watching (readTVar condition)) (note book "recovered") ((open entered >> hang) `onException` bottom)) $ \caller -> do
+        pass entered
+        atomically (writeTVar condition True)
+        awaitEnd caller
+      end `shouldBe` (FaultedWith "undefined" :: Ending ())
+      notes book `shouldReturn` ["recovered"]
+  it "that another undefined exception is made of: the same" $
+    beside (throwIO (throw (throw (ErrorCall "undefined") :: SomeException) :: SomeException)) parallel
+ where
+  exceptions =
+    [ ("SomeException", throwIO (throw (ErrorCall "undefined") :: SomeException))
+    , ("BehaviorFailed", throwIO (throw (ErrorCall "undefined") :: BehaviorFailed))
+    , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed (throw (ErrorCall "undefined") :: Failed)))
+    , ("SomeAsyncException", throwIO (throw (ErrorCall "undefined") :: SomeAsyncException))
+    , ("of a type of its own", throwIO (throw (ErrorCall "undefined") :: Fault))
+    ]
+  several =
+    [ ("parallel", parallel)
+    , ("both", both)
+    , ("firstOf", \a b -> firstOf [a, b])
+    , ("allOf", \a b -> void (allOf [a, b]))
+    , ("whileHolding", \a b -> Signal.whileHolding (pure True) (parallel a b))
+    ]
+  beside :: Behavior () -> (Behavior () -> Behavior () -> Behavior ()) -> IO ()
+  beside bottom operator = do
+    entered <- newGate
+    stopping <- newGate
+    mayEnd <- newGate
+    book <- newNotebook
+    let slow = (open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd >> note book "cleaned up")
+    end <- launching (operator slow (pass entered >> bottom)) $ \caller -> do
+      pass stopping
+      stillRunning caller
+      open mayEnd
+      awaitEnd caller
+    end `shouldBe` FaultedWith "undefined"
+    notes book `shouldReturn` ["cleaned up"]
