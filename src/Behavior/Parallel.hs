@@ -28,6 +28,13 @@ module Behavior.Parallel
   , scoped
   , fork
   , Nursery
+
+    -- * What was started
+  , Child
+  , await
+  , tryAwait
+  , requestStop
+  , ChildStopped (..)
   ) where
 
 import Behavior.Internal.Nursery

@@ -9,7 +9,7 @@ import Data.IORef
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Parallel (firstOf, fork, scoped)
+import Behavior.Parallel (firstOf, await, fork, scoped)
 import Behavior.Time (atomically, timeout)
 import Memory (inConstantMemory)
 import Support
@@ -43,9 +43,9 @@ spec = guarded . describe "In constant memory run" $ do
         step >> both (pure ()) (pure ())
         step >> firstOf [pure (), hang, hang]
         step >> timeout 3600 (pure ())
-        step >> scoped (\nursery -> fork nursery (pure ()) >>= atomically)
+        step >> scoped (\nursery -> fork nursery (pure ()) >>= atomically . await)
 
   it "five thousand forks in one scoped behaviour" $
     inConstantMemory 5000 $ \step ->
       scoped $ \nursery ->
-        replicateM_ 5000 (step >> fork nursery (pure ()) >>= atomically)
+        replicateM_ 5000 (step >> fork nursery (pure ()) >>= atomically . await)

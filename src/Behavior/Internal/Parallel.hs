@@ -14,7 +14,7 @@ module Behavior.Internal.Parallel
 
     -- * Who tells leftmost counts
   , Told
-  , tellTrouble
+  , tell
   , told
   ) where
 
