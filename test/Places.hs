@@ -15,7 +15,7 @@ import Control.Monad (void)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
-import Behavior.Parallel (allOf, firstOf, await, fork, scoped)
+import Behavior.Parallel (allOf, await, firstOf, fork, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically, timeout)
 import Support

@@ -9,8 +9,9 @@ import Data.IORef
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Parallel (firstOf, await, fork, scoped)
-import Behavior.Time (atomically, timeout)
+import Behavior.Parallel (await, firstOf, fork, requestStop, scoped, tryAwait)
+import Behavior.STM (atomically, retry)
+import Behavior.Time (timeout)
 import Memory (inConstantMemory)
 import Support
 
@@ -49,3 +50,12 @@ spec = guarded . describe "In constant memory run" $ do
     inConstantMemory 5000 $ \step ->
       scoped $ \nursery ->
         replicateM_ 5000 (step >> fork nursery (pure ()) >>= atomically . await)
+
+  it "five thousand forks in one scoped behaviour, each stopped by its handle" $
+    inConstantMemory 5000 $ \step ->
+      scoped $ \nursery ->
+        replicateM_ 5000 $ do
+          step
+          child <- fork nursery (sleep 3600)
+          requestStop child
+          atomically (tryAwait child >>= maybe retry (const (pure ())))

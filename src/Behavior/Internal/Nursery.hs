@@ -127,7 +127,7 @@ serving stage scope body = do
           _ -> retry
       -- Of those that have ended without trouble nothing is kept.
       mayLive (SomeBranch child) =
-        fmap troubleOf <$> outcomeNow child >>= \case
+        outcomeNow child >>= \end -> case troubleOf <$> end of
           Just Nothing -> False <$ forget scope child
           _ -> pure True
   serve 0 [] 16
