@@ -73,7 +73,8 @@ instance Exception ChildStopped where
 -- [Result] That of the behaviour. What was forked is then asked to stop, all at
 --   once, and has ended when 'scoped' returns.
 -- [Failure] If a forked behaviour fails, the scoped one and all the others are
---   stopped, and that failure is thrown.
+--   stopped, and that failure is thrown. (One that is stopped by 'requestStop' has not
+--   failed.)
 -- [Fault] The leftmost fault (the scoped behaviour's before those of the forked,
 --   in the order in which they were forked), in a cleanup too, is always thrown.
 -- [Cancellation] All are asked to stop at once; it returns after all have ended.
