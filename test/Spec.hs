@@ -24,6 +24,7 @@ import qualified Behavior.ScopedSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
 import qualified Behavior.StormSpec
+import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
 import qualified Examples.DoorBatterySpec
 import qualified Examples.ProgressProblemSpec
@@ -63,7 +64,9 @@ main = hspec $ do
   describe "STM" Behavior.STMSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
-  describe "From outside" Behavior.FromOutsideSpec.spec
+  describe "From outside" $ do
+    Behavior.FromOutsideSpec.spec
+    Behavior.ThrowingCleanupSpec.spec
   describe "Promises" Behavior.PromisesSpec.spec
   describe "Storms" Behavior.StormSpec.spec
   describe "Space" $ do

@@ -33,6 +33,7 @@ module Support
   , launching
   , cancelling
   , throwing
+  , awaitThrown
   , awaitEnd
   , stillRunning
   , awaitIdle
@@ -172,7 +173,11 @@ cancelling act first = launching act $ \caller -> do
 -- the exception was delivered or is waiting to be.
 throwing :: Exception e => ThreadId -> e -> IO ()
 throwing target e = do
-  thrower <- forkIO (throwTo target e)
+  forkIO (throwTo target e) >>= awaitThrown
+
+-- | Returns once what the thread throws, and then ends, was received or is pending.
+awaitThrown :: ThreadId -> IO ()
+awaitThrown thrower = do
   eventually $ (`elem` [ThreadBlocked BlockedOnException, ThreadFinished]) <$> threadStatus thrower
   -- It may be under way yet, to another capability (and to one more, if the thread was
   -- moved meanwhile). Each reads what was sent to it before it runs a thread sent later.

@@ -45,9 +45,7 @@ module Behavior.Internal.Scope
 import Control.Concurrent (ThreadId, myThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception
-  ( BlockedIndefinitelyOnMVar (..)
-  , BlockedIndefinitelyOnSTM (..)
-  , Exception (..)
+  ( Exception (..)
   , SomeAsyncException (..)
   , SomeException (..)
   , asyncExceptionFromException
@@ -59,12 +57,13 @@ import Control.Exception
   , onException
   , throwIO
   , try
-  , uninterruptibleMask_
   )
 import Control.Monad (foldM, when)
+import Data.Foldable (for_)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
+import Behavior.Internal.Deadlock (isDeadlock)
 import Behavior.Internal.Failure (BehaviorFailed (..), isFailure)
 import Behavior.Internal.Runtime
 
@@ -113,39 +112,56 @@ structured body = mask $ \restore -> do
   scope <- Scope <$> newIORef []
   -- (As @body scope@ it would be a thunk first, in every operator.)
   verdict <- try (restore (pure scope >>= body))
-  faults <- end scope
-  case (verdict, faults) of
-    (Left e, _) | not (isDeadlock e) -> case faults of
-      [] -> throwIO e
-      fault : _ -> throwIO (StoppedWithFault e fault)
-    -- What was thrown at the caller while the branches were stopping arrives here, and
+  (thrown, faults) <- end scope (either pure (const []) verdict)
+  deadlocked <- either isDeadlock (const (pure False)) verdict
+  case (if deadlocked then drop 1 thrown else thrown, faults) of
+    (first : others, _) -> do
+      throwLater others
+      throwIO (case faults of [] -> first; fault : _ -> toException (StoppedWithFault first fault))
+    -- What was thrown at the caller while it could not be interrupted arrives here, and
     -- not when the outcome has been thrown into some handler of the caller's.
-    (_, []) -> restore checkpoint >> either throwIO id verdict
-    (_, fault : _) -> do
+    ([], []) -> restore checkpoint >> either throwIO id verdict
+    ([], fault : _) -> do
       restore checkpoint `catch` \e -> throwIO (StoppedWithFault e fault)
       throwIO fault
-
--- | Whether GHC threw it because the thread waits for what will never come. It throws that to
--- a branch and to the operator that waits for it alike, so a fault of the branch comes first.
-isDeadlock :: SomeException -> Bool
-isDeadlock e = case (fromException e, fromException e) of
-  (Just BlockedIndefinitelyOnSTM, _) -> True
-  (_, Just BlockedIndefinitelyOnMVar) -> True
-  _ -> False
-
--- | Stops everything in the scope, and gives the faults from left to right.
-end :: Scope -> IO [SomeException]
-end (Scope branches) = do
-  newestFirst <- readIORef branches
-  -- Nothing may interrupt this, or the rest would be orphaned.
-  uninterruptibleMask_ (ask newestFirst)
-  reverse <$> foldM withFault [] (reverse newestFirst)
  where
-  withFault others (SomeBranch b) =
-    endedFirmly b >>= \case
-      Faulted e -> pure (e : others)
-      _ -> pure others
-  endedFirmly b = unlessAtAGlance (outcomeNow b) (firmly (atomically (outcome b)))
+  throwLater [] = pure ()
+  throwLater others = myThreadId >>= \self -> for_ others (\e -> interruptByMessengers (const e) [self])
+
+-- | Stops everything in the scope. Gives the faults from left to right, and what has been
+-- thrown at the caller, the first first: what had been before, or while this waits.
+--
+-- The caller can be interrupted here as long as nothing was thrown at it (so a cleanup may
+-- throw to it). After that it cannot, or branches would be orphaned; what is thrown stays
+-- pending, in GHC's own queue, where it can be taken back.
+end :: Scope -> [SomeException] -> IO ([SomeException], [SomeException])
+end (Scope branches) before = do
+  newestFirst <- readIORef branches
+  (asked, ()) <- once before (ask newestFirst) ((,) [] <$> askWithoutWaiting newestFirst)
+  (thrown, faults) <- foldM (withFault (map idOf newestFirst)) (asked ++ before, []) (reverse newestFirst)
+  pure (reverse thrown, reverse faults)
+ where
+  idOf (SomeBranch b) = branchId b
+  withFault threads' (thrown, faults) (SomeBranch b) = do
+    (more, o) <-
+      unlessAtAGlance (fmap ((,) []) <$> outcomeNow b) $
+        once thrown (atomically (outcome b)) (awaitUninterruptibly threads' (outcome b))
+    let thrown' = more ++ thrown
+    pure $! case o of
+      Faulted e -> (thrown', e : faults)
+      _ -> (thrown', faults)
+
+-- | Does the first, which can be interrupted, if nothing was thrown at the caller. When
+-- something is, or was, it does the second.
+once :: [SomeException] -> IO a -> IO ([SomeException], a) -> IO ([SomeException], a)
+once [] interruptibly uninterruptibly =
+  try interruptibly >>= \case
+    Right a -> pure ([], a)
+    Left e -> do
+      deadlocked <- isDeadlock e
+      (more, a) <- uninterruptibly
+      pure (if deadlocked then more else more ++ [e], a)
+once _ _ uninterruptibly = uninterruptibly
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)

@@ -1,0 +1,174 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- An operator does not wait for what waits for it: a cleanup that throws to the operator's
+-- caller. And it keeps apart what others throw to its caller meanwhile: limits of time.
+module Behavior.ThrowingCleanupSpec (spec) where
+
+import Control.Concurrent (ThreadId, forkIO, killThread, myThreadId)
+import Control.Concurrent.Async (asyncThreadId, wait)
+import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, writeTVar)
+import Control.Exception
+import Control.Monad (replicateM, replicateM_, void, when)
+import Data.Foldable (for_)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Internal.Runtime (atomically)
+import Behavior.Parallel (allOf, firstOf, scoped)
+import qualified Behavior.Signal as Signal
+import Behavior.Time (timeout)
+import Support hiding (End (..))
+
+spec :: Spec
+spec = guarded $ do
+  describe "A cleanup that throws to the operator's caller" throwing'
+  describe "Two limits that expire while an operator waits for a cleanup" limits
+
+-- | Each operator, with a first branch that goes on, and what makes it stop that.
+operators :: [(String, Behavior () -> Behavior () -> Behavior ())]
+operators =
+  [ ("parallel", \act enough -> parallel enough act)
+  , ("parallel, left", parallel)
+  , ("both", \act enough -> both act (enough >> failed))
+  , ("firstOf", \act enough -> firstOf [enough, act, hang])
+  , ("allOf", \act enough -> void (allOf [act, enough >> failed]))
+  , ("scoped", \act enough -> scoped (\_ -> parallel act enough))
+  , ("whileHolding", \act enough -> condition enough (`Signal.whileHolding` act))
+  , ("monitor", \act enough -> condition enough (\c -> Signal.monitor (not <$> c) (pure ()) act))
+  , ("monitor in parallel", \act enough -> monitor (pure False) (pure ()) act ||| enough)
+  , ("withShared in timeout", \act enough -> timeout 3600 (Signal.withShared (pure ()) (\_ -> act) ||| enough))
+  ]
+ where
+  -- A signal that is true until then.
+  condition enough body = do
+    over <- newTVarIO False
+    body (not <$> Signal.watching (readTVar over)) ||| (enough >> atomically (writeTVar over True) >> hang)
+
+throwing' :: Spec
+throwing' = do
+  for_ operators $ \(name, operator) ->
+    for_ masks $ \(manner, masked) -> do
+      it (name ++ ", " ++ manner ++ ": the operator ends, and what was thrown gets out") $
+        received 1 (operator `stopping` (masked . eStop)) False `shouldReturn` [FaultedWith (show (Fault "e-stop"))]
+      it (name ++ ", " ++ manner ++ ", twice: likewise, the one and then the other") $
+        received 2 (operator `stopping` (\me -> masked (eStop me >> throwTo me (Cancel "again")))) False
+          `shouldReturn` [FaultedWith (show (Fault "e-stop")), CancelledBy (show (Cancel "again"))]
+      it (name ++ ", " ++ manner ++ ", when the caller was cancelled: likewise") $
+        received 2 (\entered -> stopping (\act _ -> operator act hang) (masked . eStop) entered) True
+          `shouldReturn` [CancelledBy (show (Cancel "the caller")), FaultedWith (show (Fault "e-stop"))]
+
+  it "storms of them, in nested operators: all end, and nothing is orphaned" $
+    replicateM_ 20 $ do
+      gates <- mapM (const newGate) [1 .. 4 :: Int]
+      room <- newTVarIO (0 :: Int)
+      end <- launching (do
+        me <- myThreadId
+        let stormy n = do
+              self <- myThreadId
+              counted room (branch (gates !! n) (throwTo me (Fault (show n)) `finally` throwTo self (Fault "self")))
+            nested n m = do
+              self <- myThreadId
+              parallel (stormy n) (stormy m `finally` throwTo self (Fault "its operator"))
+        parallel (for_ gates pass) (both (nested 0 1) (nested 2 3))) awaitEnd
+      end `shouldSatisfy` \case
+        FaultedWith _ -> True
+        CancelledWithFault _ _ -> True
+        _ -> False
+      readTVarIO room `shouldReturn` 0
+ where
+  masks =
+    [ ("masked", id)
+    , ("uninterruptibly", uninterruptibleMask_)
+    ] :: [(String, IO () -> IO ())]
+  eStop me = throwTo me (Fault "e-stop")
+  branch entered cleanup = (open entered >> hang) `onException` cleanup
+  stopping operator cleanup entered = do
+    me <- myThreadId
+    operator (branch entered (cleanup me)) (pass entered)
+  -- What a thread receives that runs this. (Masked: it receives only where it waits.)
+  received n act cancel = do
+    entered <- newGate
+    launching (mask_ ((:) <$> ending (act entered) <*> replicateM (n - 1) (ending hang))) $ \caller -> do
+      pass entered
+      when cancel (throwing (asyncThreadId caller) (Cancel "the caller"))
+      wait caller
+  counted room act =
+    mask $ \restore -> do
+      atomically (readTVar room >>= writeTVar room . (+ 1))
+      restore act `finally` uninterruptibleMask_ (atomically (readTVar room >>= writeTVar room . subtract 1))
+
+-- | As they are with what GHC itself cannot interrupt.
+limits :: Spec
+limits =
+  for_ [("the inner one first", False), ("the outer one first", True)] $ \(order, outerFirst) -> do
+    for_ operators $ \(name, operator) ->
+      it (name ++ ", " ++ order ++ ": the outer one ends it, and none reaches what comes after") $ do
+        entered <- newGate
+        mayEnd <- newGate
+        stopping <- newGate
+        expired outerFirst stopping mayEnd $
+          operator ((open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd)) (pass entered)
+    it ("and what GHC cannot interrupt, " ++ order) $ do
+      mayEnd <- newGate
+      stopping <- newGate
+      expired outerFirst stopping mayEnd (uninterruptibleMask_ (open stopping >> pass mayEnd))
+
+expired :: Bool -> Gate -> Gate -> IO () -> IO ()
+expired outerFirst stopping mayEnd act = do
+  inner <- newLimit
+  outer <- newLimit
+  later <- newGate
+  book <- newNotebook
+  let caller = do
+        result <- limited outer (limited inner act >>= \r -> note book "between" >> pure r)
+        open later
+        mapM_ (\_ -> pass later) [1 .. 100 :: Int]
+        pure result
+  end <- launching caller $ \running -> do
+    pass stopping
+    for_ (if outerFirst then [outer, inner] else [inner, outer]) expire
+    open mayEnd
+    awaitEnd running
+  end `shouldBe` Gave Nothing
+  notes book `shouldReturn` []
+
+-- | A limit that expires when it is told to, not by the clock: otherwise it is
+-- 'System.Timeout.timeout'.
+data Limit = Limit Gate (Gate, ThreadIdBox)
+
+type ThreadIdBox = Notebook ThreadId
+
+newLimit :: IO Limit
+newLimit = (\trigger set box -> Limit trigger (set, box)) <$> newGate <*> newGate <*> newNotebook
+
+newtype Expired = Expired ThreadId
+  deriving (Eq, Show)
+
+instance Exception Expired where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException
+
+limited :: Limit -> IO a -> IO (Maybe a)
+limited (Limit trigger (set, box)) act = do
+  me <- myThreadId
+  own <- newTVarIO Nothing
+  let start = do
+        thrower <- forkIO (pass trigger >> myThreadId >>= throwTo me . Expired)
+        atomically (writeTVar own (Just thrower))
+        note box thrower
+        thrower <$ open set
+  handleJust'
+    own
+    (bracket start (uninterruptibleMask_ . killThread) (const (Just <$> act)))
+ where
+  handleJust' own body =
+    body `catch` \(Expired thrower) ->
+      readTVarIO own >>= \mine -> if mine == Just thrower then pure Nothing else throwIO (Expired thrower)
+
+-- | Has it expire. Returns when its exception was received, or is pending.
+expire :: Limit -> IO ()
+expire (Limit trigger (set, box)) = do
+  pass set
+  open trigger
+  notes box >>= mapM_ awaitThrown
