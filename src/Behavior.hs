@@ -23,8 +23,10 @@
 --    (So a slow cleanup makes the caller wait.)
 -- 2. /Never both./ 'rSelect' and 'monitor' start a branch only after the one before,
 --    cleanup included, has ended.
--- 3. /No lost work./ A branch that was asked to stop and returned all the same has
---    completed: its result stands, and it is not run again.
+-- 3. /No lost work./ An operator's own branch that was asked to stop and returned all the
+--    same has completed: its result stands, and that operator does not run it again. (An
+--    outer operator that interrupts this one between its branch's completion and its return
+--    loses the result: see below.)
 -- 4. /No lost fault./ A fault of a branch, also while it is being stopped, always
 --    gets out.
 -- 5. /Interruptible./ What runs in a thread of its own (every branch, and
@@ -36,21 +38,55 @@
 -- 8. /Labelled./ Every thread is labelled with its operator and branch.
 -- 9. /A dead sensor is never \"false\"./ A condition that fails or faults, or has no
 --    value any more, fails its operator, after the branch has stopped.
--- 10. /Nothing spins./ An operator that waits uses no processor time; readings of
---     one condition by one operator start at least a period apart.
+-- 10. /Nothing spins./ An operator that waits uses no processor time; readings of one
+--     polled condition by one operator, rereads included, have slots a period apart, and
+--     each slot has at most one.
 --
 -- == Which outcome, when several things happened
 --
--- An operator asks, in this order: Was the caller cancelled? (If a branch faulted as
--- well, 'StoppedWithFault' carries both.) Did a branch fault? (The leftmost.) Did a
--- branch complete or fail? (On a tie the left one.) Did a sensor fail? Did the
--- condition change?
+-- An operator asks, in this order:
 --
--- Two limits are GHC's. What never reaches a point where it could be interrupted is
--- not: a loop that never allocates (compile it with @-fno-omit-yields@), a safe
--- foreign call (import it @interruptible@). And a behaviour can not count on
--- recovering from 'Control.Exception.BlockedIndefinitelyOnMVar' and its like, since
--- whoever waits for it is told of the deadlock too.
+-- 1. Was something thrown at the caller from outside, of whatever type? (As by
+--    @throwTo main (ExitFailure 3)@ in a signal handler.) Every branch is stopped, and the
+--    same exception is thrown; if a branch faulted as well, 'StoppedWithFault' carries both.
+-- 2. Did a branch fault? (The leftmost.)
+-- 3. Did a branch complete or fail? (On a tie the left one.)
+-- 4. Did a sensor fail?
+-- 5. Did the condition change?
+--
+-- '?', 'attempt', 'failingOn' and handlers of your own run in the caller's thread and go by
+-- type: what is thrown there from outside, and is a failure by its type, is a failure to them.
+-- When GHC finds that all wait for each other, a branch's fault comes first.
+--
+-- == Work that must survive nested interruptions
+--
+-- Delivers twice, when the battery falls low while the phone is slow to stop: the delivery
+-- completed, but the outer 'monitor' interrupted 'Behavior.Parallel.firstOf' before that returned.
+--
+-- > monitor low charge (whileHolding ok (firstOf [deliver, phone]))
+--
+-- The branch itself records that it completed, and looks at that when it is run again:
+--
+-- > done <- newTVarIO False
+-- > let once = atomically (readTVar done) >>= \is -> unless is (deliver >> atomically (writeTVar done True))
+-- > monitor low charge (whileHolding ok (firstOf [once, phone]))
+--
+-- What must not be cut in two, the last step of @deliver@ and the record of it, is put under one
+-- 'Control.Exception.mask_'.
+--
+-- == What GHC limits
+--
+-- An operator waits for the cleanups of its branches, but not for one that waits for the operator's
+-- caller: a cleanup may throw to it. (Not where the caller runs under
+-- 'Control.Exception.uninterruptibleMask_': there it hangs, as in GHC.) Time limits from outside
+-- ('System.Timeout.timeout') that expire meanwhile stay pending, as with any thread that cannot be
+-- interrupted.
+--
+-- A behaviour that never reaches a point where it could be interrupted is not: a loop that
+-- never allocates (compile it with @-fno-omit-yields@), a safe foreign call (import it
+-- @interruptible@). A behaviour cannot count on recovering from
+-- 'Control.Exception.BlockedIndefinitelyOnMVar' and its like, since GHC throws that to the
+-- operator that waits for it too.
 module Behavior
   ( -- * Behaviours
     Behavior

@@ -34,6 +34,7 @@ module Support
   , cancelling
   , throwing
   , awaitThrown
+  , readMessages
   , awaitEnd
   , stillRunning
   , awaitIdle
@@ -180,9 +181,15 @@ awaitThrown :: ThreadId -> IO ()
 awaitThrown thrower = do
   eventually $ (`elem` [ThreadBlocked BlockedOnException, ThreadFinished]) <$> threadStatus thrower
   -- It may be under way yet, to another capability (and to one more, if the thread was
-  -- moved meanwhile). Each reads what was sent to it before it runs a thread sent later.
+  -- moved meanwhile).
+  replicateM_ 2 readMessages
+
+-- | Returns once each capability has read what was sent to it before: it does so before it
+-- runs a thread that is sent later.
+readMessages :: IO ()
+readMessages = do
   capabilities <- getNumCapabilities
-  replicateM_ 2 . for_ [1 .. capabilities] $ \c -> forkOn c (pure ()) >>= awaitOver
+  for_ [1 .. capabilities] $ \c -> forkOn c (pure ()) >>= awaitOver
 
 awaitEnd :: Async a -> IO (Ending a)
 awaitEnd caller = endingOf <$> waitCatch caller

@@ -173,9 +173,10 @@ onStop how name act =
     Failing -> throwIO (Failure name)
     Faulting -> throwIO (Fault name)
 
--- | Returns once the thread waits for another one to hear an exception.
+-- | Returns once the thread waits for another one: until that has received an exception, or
+-- has ended.
 awaitUnheard :: ThreadId -> IO ()
-awaitUnheard thread = eventually ((== ThreadBlocked BlockedOnException) <$> threadStatus thread)
+awaitUnheard thread = eventually ((`elem` map ThreadBlocked [BlockedOnException, BlockedOnSTM]) <$> threadStatus thread)
 
 -- | Whether the gate is open.
 opened :: Gate -> IO Bool

@@ -1,15 +1,19 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- |
 -- Readings of a polled sensor that go wrong: that fail, hang, cannot be interrupted, or
 -- make trouble when they are; and 'Signal.staleAfter'.
 module Behavior.BadReadingSpec (spec) where
 
 import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.STM (catchSTM)
 import Control.Exception
 import Control.Monad (void, when)
 import Data.Foldable (for_)
 import Data.Maybe (isJust)
 import Test.Hspec
 
+import Behavior (Failed)
 import Behavior.Internal.Runtime (atomically, now)
 import Behavior.Internal.Scope (SomeBranch (..), ask, outcome, structured)
 import Behavior.Internal.Source (startSensors)
@@ -210,6 +214,22 @@ stale = do
       atomically reading >>= (`shouldSatisfy` (/= began))
       pure (pure ())
 
+  it "does not forgive a reading that was overdue when it has ended" $ do
+    entered <- newGate
+    mayEnd <- newGate
+    level <- newSensor $ \n -> when (n == 1) (open entered >> pass mayEnd)
+    source <- Source.open (Signal.staleAfter 0.001 (sensing level)) Source.anything
+    structured $ \scope -> do
+      (seen, _) <- startSensors scope "test" source
+      let isStale view = atomically ((False <$ Source.firstRead view) `catchSTM` \(_ :: Failed) -> pure True)
+      pass entered
+      isStale seen `shouldReturn` True
+      open mayEnd
+      -- A view that is asked for later finds the reading that ended in time.
+      eventually $ not <$> (atomically (Source.view source) >>= isStale)
+      isStale seen `shouldReturn` True
+      pure (pure ())
+
   it "never fails a signal that is not polled" $ do
     dial <- newDial True
     Signal.rSelect (Signal.staleAfter 0.001 (watched dial)) (aWhile 0.001) hang
@@ -224,7 +244,7 @@ stale = do
       book <- newNotebook
       let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note book "reading"))
       ending (Signal.rSelect signal (note book "left") (note book "right"))
-        `shouldReturn` FaultedWith ("staleAfter: a period is more than zero seconds, not " ++ shown)
+        `shouldReturn` FaultedWith ("staleAfter: a period is at least 0.000001 seconds, not " ++ shown)
       notes book `shouldReturn` []
  where
   tooLong limit = "FailedBecause " ++ show ("no reading of the signal within " ++ limit ++ " s")

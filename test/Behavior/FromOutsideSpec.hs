@@ -12,6 +12,7 @@ import Control.Exception
 import Control.Monad (void)
 import Data.Foldable (for_)
 import System.Exit (ExitCode (..))
+import System.IO.Unsafe (unsafePerformIO)
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -109,11 +110,14 @@ usersCode = do
       (Signal.watching (readTVar level))
       (atomically (writeTVar level (Key 1)))
       (FaultedWith (show (Fault "equality")))
-  it "firstOf, allOf: a list that ends in an error starts nothing" $ do
+  it "firstOf, allOf: what was started of a list that ends in an error has ended when that gets out" $ do
     book <- newNotebook
-    for_ [firstOf, void . allOf] $ \operator ->
-      ending (operator (note book "started" : throw (Fault "list"))) `shouldReturn` FaultedWith (show (Fault "list"))
-    notes book `shouldReturn` []
+    for_ [firstOf, void . allOf] $ \operator -> do
+      entered <- newGate
+      let started = (open entered >> hang) `uninterruptibly` note book "cleaned up"
+          list = started : (unsafePerformIO (pass entered) `seq` throw (Fault "list"))
+      ending (operator list) `shouldReturn` FaultedWith (show (Fault "list"))
+    notes book `shouldReturn` ["cleaned up", "cleaned up"]
  where
   followers =
     [ ("whileHolding", Signal.whileHolding)

@@ -14,8 +14,11 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (modifyMaxSize, prop)
 import Test.QuickCheck (NonNegative (..), ioProperty, (===))
 
-import Behavior.Internal.Runtime (atomically)
+import Behavior ((|||))
+import Behavior.Internal.Runtime (atomically, sleep)
+import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (Run (outcome), explain, simulate)
 import Support
 import Watched
 
@@ -45,6 +48,20 @@ spec = guarded . describe "monitor" $ do
       Signal.monitor ((> 0) <$> dialled needed) recovery task
       let expected = concatMap (\(NonNegative n) -> "task" : replicate (n + 1) "recovery") script
       (expected ++ ["task"] ===) <$> notes book
+
+  for_ [("is done twice, when it is the result of an inner operator", False), ("is done once, when the branch itself records it", True)] $
+    \(often, recording) -> it ("work that is interrupted between its end and an inner operator's return " ++ often) $ do
+      book <- newNotebook
+      low <- newTVarIO False
+      done <- newTVarIO False
+      let deliver = sleep 1 >> note book "deliver"
+          once = atomically (readTVar done) >>= \is -> unless is . mask_ $ deliver >> atomically (writeTVar done True)
+          phone = hang `uninterruptibly` sleep 2
+          mission = Signal.whileHolding (pure True) (firstOf [if recording then once else deliver, phone])
+          charge = note book "charge" >> atomically (writeTVar low False)
+      run <- simulate (Signal.monitor (dialled low) charge mission ||| (sleep 2 >> atomically (writeTVar low True) >> hang))
+      explain (outcome run) `shouldBe` "it returned"
+      notes book `shouldReturn` (if recording then ["deliver", "charge"] else ["deliver", "charge", "deliver"])
 
   it "recovers even if the condition is false again when the task has ended" $ do
     book <- newNotebook

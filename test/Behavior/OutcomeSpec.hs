@@ -15,7 +15,7 @@ import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM (check, newEmptyTMVarIO, putTMVar, readTMVar, readTVar)
 import Control.Exception
 import Control.Monad (unless, when)
-import Data.Foldable (for_)
+import Data.Foldable (for_, traverse_)
 import GHC.Conc (unsafeIOToSTM)
 import Test.Hspec
 
@@ -178,7 +178,8 @@ afterwards op masked = do
     enough <- opened entered
     when enough (uninterruptibleMask_ (open hanging >> pass release))
     pure True
-  let main = note book "main" >> open entered >> pass hanging >> pure "main"
+  threads <- newNotebook
+  let main = (myThreadId >>= note threads) >> note book "main" >> open entered >> pass hanging >> pure "main"
       other = note book "other" >> pure "other"
       act = do
         masked $ do
@@ -187,6 +188,9 @@ afterwards op masked = do
         note book "went on"
   end <- launching act $ \caller -> do
     let self = asyncThreadId caller
+    pass hanging
+    notes threads >>= traverse_ awaitOver
+    readMessages
     awaitUnheard self
     throwing self (Cancel "the caller")
     open release

@@ -103,12 +103,12 @@ slots = do
     Signal.switch (sensing level) (\n -> when (n < 50) hang)
     mostInside room `shouldReturn` 1
 
-  for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN")] $ \(period, shown) -> do
+  for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN"), (5e-324, "5.0e-324"), (0.0000009, "0.0000009")] $ \(period, shown) -> do
     it ("a period of " ++ shown ++ " is refused, and nothing starts") $ do
       book <- newNotebook
       let signal = Signal.polling period (True <$ note book "reading")
       ending (Signal.rSelect signal (note book "left") (note book "right"))
-        `shouldReturn` FaultedWith ("polling: a period is more than zero seconds, not " ++ shown)
+        `shouldReturn` FaultedWith ("polling: a period is at least 0.000001 seconds, not " ++ shown)
       notes book `shouldReturn` []
 
 counting :: Spec

@@ -7,16 +7,17 @@ module Behavior.RefinedSpec (spec) where
 import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (throwIO)
-import Control.Monad (replicateM_, unless)
+import Control.Monad (replicateM_, unless, void)
 import Data.Foldable (for_)
 import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (choose, forAll, ioProperty, listOf1, (===))
 
-import Behavior (Seconds)
-import Behavior.Internal.Runtime (atomically, now)
+import Behavior (Seconds, (|||))
+import Behavior.Internal.Runtime (atomically, now, sleep)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (Run (finished), explore, randomly, simulate)
 import Support
 import Watched
 
@@ -27,6 +28,18 @@ spec = guarded $ do
 
 hysteresis :: Spec
 hysteresis = do
+  it "keeps its first state between the thresholds" $
+    for_ [False, True] $ \initial ->
+      Signal.switch (Signal.hysteresis initial 20 80 (pure (50 :: Int))) pure `shouldReturn` initial
+
+  it "keeps its state from one operator to the next, where it is shared" $ do
+    level <- newTVarIO (90 :: Int)
+    Signal.withShared (Signal.hysteresis False 20 80 (dialled level)) $ \charged -> do
+      Signal.switch charged pure `shouldReturn` True
+      atomically (writeTVar level 50)
+      Signal.switch charged pure `shouldReturn` True
+    Signal.switch (Signal.hysteresis False 20 80 (dialled level)) pure `shouldReturn` False
+
   prop "is a fold over the values that were seen" $
     forAll ((,) <$> thresholds <*> listOf1 (choose (0, 10))) $ \((low, high), levels) ->
       ioProperty $ do
@@ -136,6 +149,21 @@ debounce = do
     dial <- newDial True
     Signal.monitor (Signal.debounce (1 / 0) (watched dial)) (set dial (Says False)) (pure "task")
       `shouldReturn` "task"
+
+  it "counts at once the first value after a recovery, and not the one before, under any schedule" $
+    void . explore (randomly 200) $ \simulated -> do
+      book <- newNotebook
+      level <- newTVarIO True
+      let recovery = note book "recovery" >> atomically (writeTVar level False)
+      run <- simulated (Signal.monitor (Signal.debounce 1 (dialled level)) recovery (note book "task"))
+      finished run `shouldBe` 0
+      notes book `shouldReturn` ["recovery", "task"]
+
+  it "counts a change from when it came last" $ do
+    level <- newTVarIO (0 :: Int)
+    let flicker = for_ [(1, 1), (0.5, 0), (0.25, 1)] $ \(pause, value) -> sleep pause >> atomically (writeTVar level value)
+    run <- simulate (Signal.waitUntil (Signal.debounce 1 ((== 1) <$> dialled level)) ||| (flicker >> hang))
+    finished run `shouldBe` 2.75
 
   it "of no duration follows its signal" $ do
     dial <- newDial True

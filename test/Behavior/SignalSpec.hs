@@ -189,7 +189,7 @@ sharing = do
   it "refuses a bad signal before it starts the body" $ do
     book <- newNotebook
     ending (Signal.withShared (Signal.polling 0 (pure ())) (\_ -> note book "body"))
-      `shouldReturn` FaultedWith "polling: a period is more than zero seconds, not 0.0"
+      `shouldReturn` FaultedWith "polling: a period is at least 0.000001 seconds, not 0.0"
     notes book `shouldReturn` []
  where
   closed = FaultedWith "withShared: the shared signal was used outside its behaviour" :: Ending ()

@@ -58,6 +58,10 @@ throwing' = do
         received 2 (\entered -> stopping (\act _ -> operator act hang) (masked . eStop) entered) True
           `shouldReturn` [CancelledBy (show (Cancel "the caller")), FaultedWith (show (Fault "e-stop"))]
 
+  it "a masked caller has the result first" $
+    received 2 (\entered -> mask_ (stopping (\act enough -> void (firstOf [enough, act])) (uninterruptibleMask_ . eStop) entered)) False
+      `shouldReturn` [Gave (), FaultedWith (show (Fault "e-stop"))]
+
   it "storms of them, in nested operators: all end, and nothing is orphaned" $
     replicateM_ 20 $ do
       gates <- mapM (const newGate) [1 .. 4 :: Int]
@@ -86,10 +90,10 @@ throwing' = do
   stopping operator cleanup entered = do
     me <- myThreadId
     operator (branch entered (cleanup me)) (pass entered)
-  -- What a thread receives that runs this. (Masked: it receives only where it waits.)
+  -- What a thread receives that runs this, and then waits.
   received n act cancel = do
     entered <- newGate
-    launching (mask_ ((:) <$> ending (act entered) <*> replicateM (n - 1) (ending hang))) $ \caller -> do
+    launching (mask $ \restore -> (:) <$> ending (restore (act entered)) <*> replicateM (n - 1) (ending hang)) $ \caller -> do
       pass entered
       when cancel (throwing (asyncThreadId caller) (Cancel "the caller"))
       wait caller

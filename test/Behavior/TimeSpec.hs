@@ -65,10 +65,10 @@ lengths = do
       timeout s (pure ()) `shouldThrow` isRefusal "timeout: a duration is zero or more seconds, not " s
       duration "x" s `shouldThrow` isRefusal "x: a duration is zero or more seconds, not " s
 
-  it "must be more than zero where a period is asked for" $ do
-    for_ [0, -1, notANumber] $ \s ->
-      period "x" s `shouldThrow` isRefusal "x: a period is more than zero seconds, not " s
-    period "x" 0.001 `shouldReturn` 0.001
+  it "must be at least a microsecond where a period is asked for" $ do
+    for_ [0, -1, notANumber, 5e-324, 0.0000009] $ \s ->
+      period "x" s `shouldThrow` isRefusal "x: a period is at least 0.000001 seconds, not " s
+    for_ [0.000001, 0.001, infinite] $ \s -> period "x" s `shouldReturn` s
  where
   isRefusal text s (ErrorCall message) = message == text ++ show s
 

@@ -19,7 +19,7 @@ module Behavior.Internal.Parallel
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (SomeException, evaluate, throwIO)
+import Control.Exception (SomeException, throwIO)
 import Control.Monad (foldM, void, (<=<), (<$!>))
 import Data.Foldable (toList)
 import Data.Traversable (mapAccumL)
@@ -120,7 +120,7 @@ both left right = structured $ \scope -> do
 -- @since 0.1.0.0
 firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
-firstOf behaviors = counted behaviors $ \scope -> do
+firstOf behaviors = structured $ \scope -> do
   first <- newTVarIO Nothing
   void $ startAll (\n -> branchThen (tell first n) scope (Label "firstOf" (show n))) behaviors
   settle <$> unlessAtAGlance (toldNow first) (atomically (told first))
@@ -138,9 +138,9 @@ firstOf behaviors = counted behaviors $ \scope -> do
 --
 -- @since 0.1.0.0
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
-allOf behaviors = counted acts $ \scope -> do
+allOf behaviors = structured $ \scope -> do
   trouble <- newTVarIO Nothing
-  branches <- startAll (\n -> branchThen (tellTrouble trouble n) scope (Label "allOf" (show n))) acts
+  branches <- startAll (\n -> branchThen (tellTrouble trouble n) scope (Label "allOf" (show n))) (toList behaviors)
   let waiting [] = pure (refilled behaviors <$> traverse (settle <=< ended) branches)
       waiting (b : bs) = do
         wrong <-
@@ -150,14 +150,6 @@ allOf behaviors = counted acts $ \scope -> do
               _ -> Just <$> told trouble
         maybe (waiting bs) (pure . throwIO) wrong
   waiting branches
- where
-  acts = toList behaviors
-
--- | 'structured', when it is known how many behaviours there are: what is thrown while they
--- are counted is thrown before any is started.
-counted :: [Behavior x] -> (Scope -> IO (IO a)) -> IO a
-counted behaviors body = evaluate (length behaviors) >> structured body
-
 -- | The container, with these (as many) for its elements.
 refilled :: Traversable t => t x -> [a] -> t a
 refilled container = snd . flip (mapAccumL next) container

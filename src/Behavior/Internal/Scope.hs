@@ -46,12 +46,14 @@ import Control.Concurrent (ThreadId, myThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception
   ( Exception (..)
+  , MaskingState (..)
   , SomeAsyncException (..)
   , SomeException (..)
   , asyncExceptionFromException
   , asyncExceptionToException
   , catch
   , evaluate
+  , getMaskingState
   , mask
   , mask_
   , onException
@@ -59,6 +61,7 @@ import Control.Exception
   , try
   )
 import Control.Monad (foldM, when)
+import Data.Either (isLeft)
 import Data.Foldable (for_)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
@@ -108,22 +111,27 @@ data Outcome a
 -- | Lets the body start branches and come to a verdict (an action that returns or
 -- throws), stops what still runs, and gives the outcome.
 structured :: (Scope -> IO (IO a)) -> IO a
-structured body = mask $ \restore -> do
-  scope <- Scope <$> newIORef []
-  -- (As @body scope@ it would be a thunk first, in every operator.)
-  verdict <- try (restore (pure scope >>= body))
-  (thrown, faults) <- end scope (either pure (const []) verdict)
-  deadlocked <- either isDeadlock (const (pure False)) verdict
-  case (if deadlocked then drop 1 thrown else thrown, faults) of
-    (first : others, _) -> do
-      throwLater others
-      throwIO (case faults of [] -> first; fault : _ -> toException (StoppedWithFault first fault))
-    -- What was thrown at the caller while it could not be interrupted arrives here, and
-    -- not when the outcome has been thrown into some handler of the caller's.
-    ([], []) -> restore checkpoint >> either throwIO id verdict
-    ([], fault : _) -> do
-      restore checkpoint `catch` \e -> throwIO (StoppedWithFault e fault)
-      throwIO fault
+structured body = do
+  state <- getMaskingState
+  mask $ \restore -> do
+    scope <- Scope <$> newIORef []
+    -- (As @body scope@ it would be a thunk first, in every operator.)
+    verdict <- try (restore (pure scope >>= body))
+    (thrown, faults) <- end scope state (either pure (const []) verdict)
+    deadlocked <- either isDeadlock (const (pure False)) verdict
+    case (if deadlocked then drop 1 thrown else thrown, faults) of
+      (first : others, _) | state == Unmasked || isLeft verdict -> do
+        throwLater others
+        throwIO (case faults of [] -> first; fault : _ -> toException (StoppedWithFault first fault))
+      (others, _) -> do
+        throwLater others
+        -- What was thrown at the caller while it could not be interrupted arrives here, and
+        -- not when the outcome has been thrown into some handler of the caller's.
+        case faults of
+          [] -> restore checkpoint >> either throwIO id verdict
+          fault : _ -> do
+            restore checkpoint `catch` \e -> throwIO (StoppedWithFault e fault)
+            throwIO fault
  where
   throwLater [] = pure ()
   throwLater others = myThreadId >>= \self -> for_ others (\e -> interruptByMessengers (const e) [self])
@@ -131,14 +139,15 @@ structured body = mask $ \restore -> do
 -- | Stops everything in the scope. Gives the faults from left to right, and what has been
 -- thrown at the caller, the first first: what had been before, or while this waits.
 --
--- The caller can be interrupted here as long as nothing was thrown at it (so a cleanup may
--- throw to it). After that it cannot, or branches would be orphaned; what is thrown stays
--- pending, in GHC's own queue, where it can be taken back.
-end :: Scope -> [SomeException] -> IO ([SomeException], [SomeException])
-end (Scope branches) before = do
+-- A caller that is not masked can be interrupted here as long as nothing was thrown at it (so
+-- a cleanup may throw to it). After that it cannot, or branches would be orphaned; what is
+-- thrown stays pending, in GHC's own queue, where it can be taken back. Neither can a caller
+-- that is masked: it must not lose the verdict.
+end :: Scope -> MaskingState -> [SomeException] -> IO ([SomeException], [SomeException])
+end (Scope branches) state before = do
   newestFirst <- readIORef branches
-  (asked, ()) <- once before (ask newestFirst) ((,) [] <$> askWithoutWaiting newestFirst)
-  (thrown, faults) <- foldM (withFault (map idOf newestFirst)) (asked ++ before, []) (reverse newestFirst)
+  (more, ()) <- once before (ask newestFirst) ((,) [] <$> askWithoutWaiting newestFirst)
+  (thrown, faults) <- foldM (withFault (map idOf newestFirst)) (more ++ before, []) (reverse newestFirst)
   pure (reverse thrown, reverse faults)
  where
   idOf (SomeBranch b) = branchId b
@@ -150,18 +159,16 @@ end (Scope branches) before = do
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)
-
--- | Does the first, which can be interrupted, if nothing was thrown at the caller. When
--- something is, or was, it does the second.
-once :: [SomeException] -> IO a -> IO ([SomeException], a) -> IO ([SomeException], a)
-once [] interruptibly uninterruptibly =
-  try interruptibly >>= \case
-    Right a -> pure ([], a)
-    Left e -> do
-      deadlocked <- isDeadlock e
-      (more, a) <- uninterruptibly
-      pure (if deadlocked then more else more ++ [e], a)
-once _ _ uninterruptibly = uninterruptibly
+  -- The first can be interrupted; then the second is done.
+  once thrown interruptibly uninterruptibly
+    | state == Unmasked, null thrown =
+        try interruptibly >>= \case
+          Right a -> pure ([], a)
+          Left e -> do
+            deadlocked <- isDeadlock e
+            (more, a) <- uninterruptibly
+            pure (if deadlocked then more else more ++ [e], a)
+    | otherwise = uninterruptibly
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)

@@ -21,8 +21,10 @@ newtype Seconds = Seconds Double
   deriving (Eq, Ord, Num, Fractional, Real, RealFrac)
 
 instance Show Seconds where
-  -- 0.05, and not 5.0e-2
-  showsPrec precedence (Seconds s) = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
+  -- 0.05, and not 5.0e-2; but 5.0e-324
+  showsPrec precedence (Seconds s)
+    | s /= 0, abs s < 1e-9 = showsPrec precedence s
+    | otherwise = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
 
 instance Read Seconds where
   readsPrec precedence input = [(Seconds s, rest) | (s, rest) <- readsPrec precedence input]
@@ -33,11 +35,12 @@ duration operator seconds
   | seconds >= 0 = pure seconds
   | otherwise = refuse operator "a duration is zero or more seconds" seconds
 
--- | Refuses what is no period: zero, a negative number, or NaN.
+-- | Refuses what is no period: less than a microsecond, which the clock cannot tell from
+-- none, or NaN.
 period :: String -> Seconds -> IO Seconds
 period operator seconds
-  | seconds > 0 = pure seconds
-  | otherwise = refuse operator "a period is more than zero seconds" seconds
+  | seconds >= 0.000001 = pure seconds
+  | otherwise = refuse operator "a period is at least 0.000001 seconds" seconds
 
 refuse :: String -> String -> Seconds -> IO a
 refuse operator allowed seconds =

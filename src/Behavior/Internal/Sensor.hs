@@ -24,8 +24,8 @@ import Behavior.Internal.Source
 -- | A sensor that must be asked: @polling seconds act@ reads it by @act@, in a
 -- thread of its own, one reading at a time.
 --
--- Readings start in slots that are so many seconds apart, counted from start to
--- start, one in each. A reading that overruns its slot skips those that it missed.
+-- Readings start in slots that are a period apart, counted from start to start; each slot
+-- has at most one. A reading that overruns its slot skips those that it missed.
 -- What an operator decides on is always a reading that began after it asked; so after a
 -- branch was stopped it waits for the next slot.
 --
@@ -35,7 +35,11 @@ import Behavior.Internal.Source
 -- machine is busy, does not put off the others.
 --
 -- A reading that fails or faults is no value: the operator throws the same. The
--- number of seconds must be more than zero (an 'Control.Exception.ErrorCall' says so).
+-- period must be at least a microsecond (an 'Control.Exception.ErrorCall' says so); an
+-- infinite one is for a sensor that is read once.
+--
+-- >>> Signal.waitUntil (Signal.polling 5e-324 (pure True))
+-- *** Exception: polling: a period is at least 0.000001 seconds, not 5.0e-324
 --
 -- >>> import Data.IORef
 -- >>> level <- newIORef (12 :: Int)
@@ -100,8 +104,8 @@ polling every act = Signal $ \demand -> do
 -- | What was last published of a sensor, and its generation.
 data Published a = Unpublished | Published !Int a
 
--- | Fails the operator when a polled reading of the signal takes longer than so
--- many seconds (more than zero).
+-- | Fails the operator when a polled reading of the signal takes longer than the given
+-- number of seconds (at least a microsecond).
 --
 -- The branch is stopped at once. A reading that cannot be interrupted makes the
 -- operator wait with its return, not with the stop. A signal that is not polled is
