@@ -1,4 +1,4 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -15,6 +15,7 @@ help:
 	@echo 'make bench     what it costs, and whether that is as promised (KEEP=1 keeps the ratios;'
 	@echo '               make bench-check: is anything slower than in those that are kept?)'
 	@echo 'make soak      ever more random schedules and programs (SECONDS=600 for ten minutes)'
+	@echo 'make signals   SIGINT and SIGTERM at 1,000 random moments each (MOMENTS=100 for fewer)'
 	@echo 'make clean     remove what was built'
 
 demo:
@@ -38,6 +39,9 @@ bench-check:
 
 soak:
 	@.ci/soak $(or $(SECONDS),300)
+
+signals:
+	@.ci/signals $(or $(MOMENTS),1000)
 
 ci:
 	@.ci/run

@@ -97,6 +97,7 @@ module Behavior
     -- * What to do when something fails
   , fallback
   , (?)
+  , fallbackWith
   , fallbackOver
   , attempt
 
@@ -117,6 +118,10 @@ module Behavior
   , BehaviorFailed (..)
   , behaviorFailedToException
   , behaviorFailedFromException
+
+    -- * What to do about a fault
+  , tryAny
+  , catchAny
 
     -- * Faults met while stopping
   , StoppedWithFault (..)

@@ -15,7 +15,7 @@ import Control.Monad (void)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
-import Behavior.Parallel (allOf, firstOf, fork, scoped)
+import Behavior.Parallel (allOf, await, firstOf, fork, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically, timeout)
 import Support
@@ -58,7 +58,7 @@ places =
   , inThread "allOf" "3" (\act -> void (allOf [pure (), pure (), act]))
   , inThread "scoped" "body" (\act -> scoped (const act))
   , inThread "scoped" "fork" $ \act ->
-      scoped (\nursery -> fork nursery act >>= atomically)
+      scoped (\nursery -> fork nursery act >>= atomically . await)
   , inThread "timeout" "branch" (timeout 3600)
   , inThread "rSelect" "left" (\act -> Signal.rSelect (pure True) act hang)
   , inThread "rSelect" "right" (\act -> rSelect (pure False) hang act)

@@ -126,6 +126,19 @@ subtle =
     alone (RSelect (Polled 1 (act 1 "s" (Succeeds 1) (EndsAfter 0 Faults))) (act 1 "l" Faults StopsAtOnce) (act 1 "r" Fails StopsAtOnce))
   , -- The answer is there just as time is up.
     alone (Timeout 2 (Scoped (Await (act 2 "a" (Succeeds 1) StopsAtOnce) (act 1 "b" (Succeeds 2) StopsAtOnce))))
+  , -- The child fails, and whoever awaits it goes on for a moment.
+    alone (Scoped (Await (act 1 "a" Fails StopsAtOnce) (act 1 "b" Fails StopsAtOnce `Else` act 0 "c" Fails StopsAtOnce) `Else` act 1 "d" Fails StopsAtOnce))
+  , -- The child is stopped by its handle, just as it ends.
+    alone (Scoped (Retract (act 1 "a" (Succeeds 1) StopsAtOnce) (act 1 "b" (Succeeds 2) StopsAtOnce) `Else` act 1 "c" (Succeeds 3) StopsAtOnce))
+  , -- It fails in its cleanup.
+    alone (Scoped (Retract (act 9 "a" Fails (EndsAfter 1 Fails)) (act 1 "b" (Succeeds 2) StopsAtOnce) `Else` act 1 "c" (Succeeds 3) StopsAtOnce))
+  , -- It forks as the body returns.
+    alone (Scoped (Fork (deaf 1 "a" `Then` (Fork (act 1 "b" Fails StopsAtOnce) `Else` act 1 "c" Fails StopsAtOnce)) `Then` act 1 "d" (Succeeds 1) StopsAtOnce))
+  , -- The scope is asked to stop just as it has started a child.
+    (alone (Scoped (act 1 "a" (Succeeds 1) StopsAtOnce `Then` (Fork (act 1 "b" Fails StopsAtOnce) `Else` act 1 "c" Fails StopsAtOnce))))
+      { patience = 1
+      , caller = Stranger Asynchronous 9
+      }
   , -- It completes although asked to stop, and is asked again.
     (alone (Parallel (deaf 3 "a") (act 9 "b" Fails (EndsAfter 1 Faults)) `Else` act 9 "c" Fails StopsAtOnce))
       { patience = 1
@@ -242,9 +255,17 @@ relation = do
     it "stops what was forked when the body ends, and all when that fails" $ do
       Scoped (Fork (stoppedBy (StopsAfter 2) "a") `Then` act "b" 1 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
       Scoped (Fork (act "a" 1 Fails) `Then` stoppedBy (StopsAfter 2) "b") `endsIn` [Gave 3 (Failed "a")]
-    it "waits for the result of what was forked, which never comes of a failure" $ do
+    it "waits for the result of what was forked, or how else it ends" $ do
       Scoped (Await (act "a" 3 (Succeeds 7)) (act "b" 1 (Succeeds 1))) `endsIn` [Gave 3 (Succeeded (Number 7))]
       Scoped (Await (act "a" 3 Fails) (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 1)) `endsIn` [Gave 3 (Failed "a")]
+
+    it "stops what was forked when that is requested, which is no failure of the scope but of whoever awaits it" $ do
+      Scoped (Retract (stoppedBy (StopsAfter 2) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7)) `endsIn` [Gave 4 (Succeeded (Number 7))]
+      Scoped (Retract (stoppedBy (EndsAfter 2 (Succeeds 7)) "a") (act "b" 1 (Succeeds 1))) `endsIn` [Gave 3 (Succeeded (Number 7))]
+      Scoped (Retract (stoppedBy (EndsAfter 2 Faults) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7)) `endsIn` [Gave 3 (Faulted (cleanupOf "a"))]
+    it "fails to fork while all is being stopped" $
+      Scoped (Fork (Do "a" [(script 2 (Succeeds 0)) {masking = Uninterruptible}] `Then` Fork (act "b" 1 Faults)) `Then` act "c" 1 (Succeeds 7))
+        `endsIn` [Gave 2 (Succeeded (Number 7))]
 
   describe "Being asked to stop" $ do
     it "keeps the result of what completed although it was asked to stop" $

@@ -19,6 +19,7 @@ import qualified Behavior.ReactiveSpec
 import qualified Behavior.RefinedSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
+import qualified Behavior.STMSpec
 import qualified Behavior.ScopedSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
@@ -64,6 +65,7 @@ main = hspec $ do
   describe "Time" $ do
     Behavior.TimeSpec.spec
     Behavior.AlarmSpec.spec
+  describe "STM" Behavior.STMSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
   describe "From outside" $ do

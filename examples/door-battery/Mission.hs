@@ -9,13 +9,13 @@ module Mission
   , simulated
   ) where
 
-import Control.Concurrent.STM (readTVarIO)
 import Control.Exception (ErrorCall (..), Handler (..), catches, displayException, throwIO)
 import Data.IORef (modifyIORef, newIORef, readIORef)
 import System.Exit (ExitCode (..))
 
 import Behavior
 import Behavior.Parallel (firstOf)
+import Behavior.STM (readTVarIO)
 import Behavior.Sim (Outcome (..), Run (..), Schedule, defaults, explain, simulateWith)
 import qualified Behavior.Sim as Sim
 import Event

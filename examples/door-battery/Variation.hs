@@ -4,12 +4,11 @@ module Variation
   ( variation
   ) where
 
-import Control.Concurrent.STM (newTVarIO, stateTVar)
 import Data.Bits (shiftR, xor)
 import Data.Word (Word64)
 
 import Behavior (Behavior)
-import Behavior.Time (atomically)
+import Behavior.STM (atomically, newTVarIO, stateTVar)
 
 -- | Each run of the behaviour that this gives gives another factor from 0.8 to 1.2.
 variation :: Integer -> IO (Behavior Double)

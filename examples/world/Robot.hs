@@ -54,13 +54,13 @@ module Robot
   , a5
   ) where
 
-import Control.Concurrent.STM (STM, modifyTVar', readTVar, readTVarIO, writeTVar)
 import Control.Exception (bracket)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
 import System.IO.Unsafe (unsafePerformIO)
 
 import Battery (wholePercent)
 import Behavior
+import Behavior.STM (STM, modifyTVar', readTVar, readTVarIO, writeTVar)
 import World
 
 -- | Runs the action with this world for all that is in this module.

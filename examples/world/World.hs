@@ -40,17 +40,6 @@ module World
   , narrating
   ) where
 
-import Control.Concurrent.STM
-  ( STM
-  , TVar
-  , modifyTVar'
-  , newTVarIO
-  , orElse
-  , readTVar
-  , readTVarIO
-  , retry
-  , writeTVar
-  )
 import Control.Exception
   ( Exception (..)
   , SomeAsyncException
@@ -72,7 +61,19 @@ import Battery
 import Behavior
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, now)
+import Behavior.STM
+  ( STM
+  , TVar
+  , atomically
+  , modifyTVar'
+  , newTVarIO
+  , orElse
+  , readTVar
+  , readTVarIO
+  , retry
+  , writeTVar
+  )
+import Behavior.Time (now)
 import Event
 
 -- | How a world is at first, and what holds in it.

@@ -12,6 +12,9 @@
 -- | 'scoped' and 'fork'             | the scoped one   | its result                    |
 -- +---------------------------------+------------------+-------------------------------+
 --
+-- What 'fork' starts is a 'Child': one can 'await' its result, look at it without waiting
+-- ('tryAwait'), and ask it to stop ('requestStop').
+--
 -- Whatever happens, what these start has ended, cleanup included, when they return
 -- or throw.
 module Behavior.Parallel
@@ -28,6 +31,14 @@ module Behavior.Parallel
   , scoped
   , fork
   , Nursery
+
+    -- * What was started
+  , Child
+  , await
+  , tryAwait
+  , requestStop
+  , ChildStopped (..)
   ) where
 
+import Behavior.Internal.Nursery
 import Behavior.Internal.Parallel

@@ -2,9 +2,11 @@
 
 module Behavior.FailureSpec (spec) where
 
+import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM (newTVarIO, readTVarIO, writeTVar)
 import Control.Exception
 import Control.Monad (void, (>=>))
+import Data.Either (fromRight)
 import Data.Foldable (for_)
 import Data.IORef
 import qualified Data.List.NonEmpty as NonEmpty
@@ -23,6 +25,8 @@ spec = guarded $ do
   describe "fallback" fallbacks
   describe "fallbackOver" fallbacksOver
   describe "attempt" attempts
+  describe "fallbackWith" fallbacksWith
+  describe "tryAny and catchAny" catchingAny
   describe "failingOn" failingOns
   describe "a composition of ?, attempt, fallbackOver, >>= and pure" $
     it "ends as the pure model says, having done the same in the same order" $
@@ -142,6 +146,72 @@ fallbacks = do
 
   inCallersState "its second behaviour" (failed ?)
   inCallersState "its first behaviour" (? pure Unmasked)
+
+fallbacksWith :: Spec
+fallbacksWith = do
+  it "is fallback when the second behaviour does not look at the failure" $
+    property $ \a b ->
+      sameAs
+        (\notebook -> fallbackWith (play notebook a) (const (play notebook b)))
+        (\notebook -> play notebook a ? play notebook b)
+
+  it "gives the second behaviour the failure" $ do
+    fallbackWith (throwIO (Failure "locked")) (pure . show) `shouldReturn` show (Failure "locked")
+    fallbackWith (throwIO (Failure "locked")) throwIO `shouldThrow` (== Failure "locked")
+
+  it "runs the second behaviour after the handlers of the first have ended" $ do
+    let first notebook = (failed `onException` note notebook "handler") `finally` note notebook "cleanup"
+    observing (\notebook -> fallbackWith (first notebook) (const (note notebook "second")))
+      `shouldReturn` (Gave (), ["handler", "cleanup", "second"])
+
+  it "can be cancelled in the second behaviour" $ do
+    inside <- newGate
+    cancelling (fallbackWith failed (const (open inside >> hang))) (pass inside)
+      `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+
+  inCallersState "its second behaviour" (fallbackWith failed . const)
+  inCallersState "its first behaviour" (`fallbackWith` const (pure Unmasked))
+
+catchingAny :: Spec
+catchingAny = do
+  it "gives the result, the failure or the fault, and lets a cancellation through" $
+    property $ \(Script name end) ->
+      ioProperty $ do
+        (actual, _) <- observing (\notebook -> either (Left . show) Right <$> tryAny (play notebook (Script name end)))
+        pure $ case end of
+          Succeeds n -> actual === Gave (Right n)
+          Fails why -> actual === Gave (Left (show (Failure why)))
+          Faults why -> actual === Gave (Left (show (Fault why)))
+          Cancels why -> actual === CancelledBy (show (Cancel why))
+
+  it "chooses by type: a synchronous one thrown from outside counts as the behaviour's own" $ do
+    inside <- newGate
+    launching (either show show <$> tryAny (open inside >> hang :: IO ())) $ \caller -> do
+      pass inside
+      throwTo (asyncThreadId caller) (Fault "from outside")
+      awaitEnd caller `shouldReturn` Gave (show (Fault "from outside"))
+
+  it "is tryAny, then the handler" $
+    property $ \a b ->
+      sameAs
+        (\notebook -> catchAny (play notebook a) (const (play notebook b)))
+        (\notebook -> tryAny (play notebook a) >>= either (const (play notebook b)) pure)
+
+  it "does not keep a caller that is cancelled from stopping" $ do
+    notebook <- newNotebook
+    inside <- newGate
+    cancelling (catchAny (open inside >> hang) (\_ -> note notebook "went on")) (pass inside)
+      `shouldReturn` CancelledBy (show (Cancel "the caller"))
+    notes notebook `shouldReturn` []
+
+  it "can be cancelled in the handler" $ do
+    inside <- newGate
+    cancelling (catchAny failed (const (open inside >> hang))) (pass inside)
+      `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+
+  inCallersState "its handler" (catchAny failed . const)
+  inCallersState "its behaviour" (`catchAny` const (pure Unmasked))
+  inCallersState "its behaviour" (fmap (fromRight Unmasked) . tryAny)
 
 fallbacksOver :: Spec
 fallbacksOver = do

@@ -1,3 +1,4 @@
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
@@ -6,10 +7,13 @@
 module Behavior.RunBehaviorSpec (spec) where
 
 import Control.Concurrent
-import Control.Concurrent.Async (wait, waitCatchSTM)
+import Control.Concurrent.Async (asyncThreadId, poll, wait, waitCatchSTM, withAsyncBound)
 import Control.Exception
+import Control.Monad (join, replicateM_, void, when)
 import Data.Either (fromLeft)
 import Data.Foldable (for_)
+import Data.Maybe (isNothing)
+import GHC.Conc (ThreadStatus (..), threadStatus)
 import System.Exit (ExitCode (..))
 import System.IO (hFlush, stdout)
 import System.Mem (performMajorGC)
@@ -66,23 +70,89 @@ spec = guarded . describe "runBehavior" $ do
 
     it ("leaves it to others what a " ++ name ++ " does, before and after") $
       for_ [pure (), failed, throwIO (Fault "bug"), raiseSignal signal >> hang] $ \act -> do
-        heard <- newEmptyMVar
-        bracket
-          (installHandler signal (Catch (putMVar heard ())) Nothing)
-          (\old -> installHandler signal old Nothing)
-          ( \_ -> do
-              _ <- try (runBehavior act) :: IO (Either SomeException ())
-              raiseSignal signal
-              takeMVar heard
-          )
+        withHandler signal $ \heard -> do
+          _ <- try (runBehavior act) :: IO (Either SomeException ())
+          raiseSignal signal
+          takeMVar heard
 
     it ("ends the process at once at a second " ++ name ++ ", even during a cleanup") $
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal signal >> hang)))
         >>= (`shouldBe` Terminated signal False)
 
+    it ("gives a " ++ name ++ " whose handler starts after the end to the handler that was there before") $
+      withHandler signal $ \heard -> do
+        join (runBehavior (installed signal))
+        takeMVar heard
+
+    it ("gives a " ++ name ++ " whose handler starts after the end to a handler that was installed meanwhile") $ do
+      late <- runBehavior (installed signal)
+      withHandler signal $ \heard -> late >> takeMVar heard
+
+    it ("cancels the next behaviour by a " ++ name ++ " whose handler starts after the end of the one before") $ do
+      late <- runBehavior (installed signal)
+      runBehavior (late >> hang) `shouldThrow` (== ExitFailure code)
+
+    it ("gives a " ++ name ++ " to the handler that was there before when the caller was cancelled first") $
+      withHandler signal $ \heard -> do
+        inside <- newGate
+        let act = (open inside >> hang) `onException` join (installed signal)
+        cancelling (runBehavior act) (pass inside)
+          `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+        takeMVar heard
+
+    it ("ends the process by a " ++ name ++ " after the end, where that is the default") $ do
+      inChild (byDefault signal >> runBehavior (pure ()) >> raiseSignal signal >> hang)
+        >>= (`shouldBe` Terminated signal False)
+      inChild (byDefault signal >> replicateM_ 100 (runBehavior (pure ())) >> raiseSignal signal >> hang)
+        >>= (`shouldBe` Terminated signal False)
+      inChild (byDefault signal >> join (runBehavior (installed signal)) >> hang)
+        >>= (`shouldBe` Terminated signal False)
+
+    it ("cancels all that run by a " ++ name ++ ", side by side or one inside the other") $ do
+      inside <- newGate
+      launching (runBehavior (runBehavior (open inside >> hang))) $ \other -> do
+        pass inside
+        (runBehavior (raiseSignal signal >> hang) :: IO ()) `shouldThrow` (== ExitFailure code)
+        (wait other :: IO ()) `shouldThrow` (== ExitFailure code)
+
+    it ("throws the exit in the thread that called it after a " ++ name ++ "; the process goes on") $
+      inChild
+        ( do
+            end <- newEmptyMVar
+            _ <- forkIO (try (runBehavior (raiseSignal signal >> hang)) >>= putMVar end)
+            takeMVar end >>= (`shouldBe` (Left (ExitFailure code) :: Either ExitCode ()))
+            throwIO (ExitFailure 7)
+        )
+        >>= (`shouldBe` Exited (ExitFailure 7))
+
     it ("makes it the exit code of the process after a " ++ name) $
       inChild (runBehavior (raiseSignal signal >> hang))
         >>= (`shouldBe` Exited (ExitFailure code))
+
+  it "waits for an action in runInBoundThread, which nothing interrupts" $
+    when rtsSupportsBoundThreads $ do
+      notebook <- newNotebook
+      inside <- newGate
+      mayEnd <- newGate
+      let act = runInBoundThread (open inside >> pass mayEnd >> note notebook "to its end")
+      launching (runBehavior act) $ \caller -> do
+        pass inside
+        throwing (asyncThreadId caller) (Cancel "the caller")
+        -- It waits: in the stop request, or for the end.
+        eventually (isBlocked <$> threadStatus (asyncThreadId caller))
+        poll caller >>= (`shouldBe` True) . isNothing
+        open mayEnd
+        awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "the caller"))
+      notes notebook `shouldReturn` ["to its end"]
+
+  it "interrupts an action in a bound thread that withAsyncBound has started" $
+    when rtsSupportsBoundThreads $ do
+      notebook <- newNotebook
+      inside <- newGate
+      let act = (open inside >> hang) `onException` note notebook "cleaned up"
+      cancelling (runBehavior (withAsyncBound act wait)) (pass inside)
+        `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+      notes notebook `shouldReturn` ["cleaned up"]
 
   it "does not return before the behaviour has ended when its caller is cancelled" $ do
     notebook <- newNotebook
@@ -102,7 +172,31 @@ spec = guarded . describe "runBehavior" $ do
       open found
       end `shouldBe` FaultedWith (show BlockedIndefinitelyOnMVar)
  where
+  isBlocked = \case
+    ThreadBlocked _ -> True
+    _ -> False
   bound act = if rtsSupportsBoundThreads then runInBoundThread act else act
+
+-- | The action of the handler that is there.
+installed :: Signal -> IO (IO ())
+installed signal = do
+  there <- installHandler signal Ignore Nothing
+  _ <- installHandler signal there Nothing
+  case there of
+    Catch act -> pure act
+    _ -> throwIO (ErrorCall "no handler")
+
+byDefault :: Signal -> IO ()
+byDefault signal = void (installHandler signal Default Nothing)
+
+-- | Runs it where a signal fills a box.
+withHandler :: Signal -> (MVar () -> IO a) -> IO a
+withHandler signal act = do
+  heard <- newEmptyMVar
+  bracket
+    (installHandler signal (Catch (putMVar heard ())) Nothing)
+    (\old -> installHandler signal old Nothing)
+    (const (act heard))
 
 -- | Runs it as the program of a child, and says how that one ended. It is killed by
 -- an alarm when it takes more than five seconds.

@@ -1,19 +1,21 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- |
 -- Behaviours that run beside a scoped one.
 module Behavior.ScopedSpec (spec) where
 
 import Control.Concurrent
-import Control.Concurrent.Async (withAsync)
-import Control.Concurrent.STM (STM)
+import Control.Concurrent.Async (wait, withAsync)
 import Control.Exception
-import Control.Monad (forever, replicateM_, void)
+import Control.Monad (forever, replicateM, replicateM_, void)
 import Data.Foldable (for_)
+import Data.Maybe (isNothing)
 import Data.Traversable (for)
 import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Internal.Runtime (living)
-import Behavior.Parallel (fork, scoped)
+import Behavior.Parallel
 import Behavior.Time (atomically)
 import Support
 
@@ -26,7 +28,7 @@ spec = guarded $ do
     scoped
       ( \nursery -> do
           answers <- for [1 .. 10 :: Int] (fork nursery . pure)
-          for answers atomically
+          for answers (atomically . await)
       )
       `shouldReturn` [1 .. 10]
 
@@ -41,7 +43,7 @@ spec = guarded $ do
   it "has started what was forked when fork returns" $
     scoped $ \nursery -> do
       before' <- living
-      _ <- fork nursery hang :: IO (STM ())
+      _ <- fork nursery hang :: IO (Child ())
       living `shouldReturn` before' + 1
 
   it "lets what was forked fork in its turn, and everything end together" $ do
@@ -70,7 +72,7 @@ spec = guarded $ do
         inside <- newGate
         there <- newGate
         _ <- fork nursery ((open inside >> hang) `onException` note notebook "other")
-        _ <- fork nursery (pass inside >> pass there >> failWith "forked") :: IO (STM ())
+        _ <- fork nursery (pass inside >> pass there >> failWith "forked") :: IO (Child ())
         (open there >> hang) `onException` note notebook "scoped"
     end `shouldBe` (FailedWith (show (FailedBecause "forked")) :: Ending ())
     done `shouldMatchList` ["other", "scoped"]
@@ -100,33 +102,195 @@ spec = guarded $ do
     scoped
       ( \nursery -> do
           answer <- newEmptyMVar
-          withAsync (fork nursery (pure 'a') >>= putMVar answer) $ \_ -> takeMVar answer >>= atomically
+          withAsync (fork nursery (pure 'a') >>= putMVar answer) $ \_ -> takeMVar answer >>= atomically . await
       )
       `shouldReturn` 'a'
 
-  it "lets a cleanup fork, when all is being stopped: it does not wait, and nothing runs" $ do
+  it "fails to fork while all is being stopped, in a cleanup of the scoped behaviour or of a child, and nothing runs" $ do
     inside <- newGate
+    inside' <- newGate
+    let forking notebook nursery = ending (void (fork nursery (note notebook "forked"))) >>= note notebook . show
     (end, done) <- observing $ \notebook ->
       scoped
-        ( \nursery ->
-            (open inside >> hang)
-              `onException` (fork nursery (note notebook "forked") >> note notebook "went on")
+        ( \nursery -> do
+            _ <- fork nursery ((open inside' >> hang) `onException` forking notebook nursery) :: IO (Child ())
+            (open inside >> hang) `onException` forking notebook nursery
         )
-        ||| pass inside
-    (end, done) `shouldBe` (Gave (), ["went on"])
+        ||| (pass inside >> pass inside')
+    let tooLate = FailedWith (show (FailedBecause "fork: the nursery's scoped behaviour is ending")) :: Ending ()
+    (end, done) `shouldBe` (Gave (), [show tooLate, show tooLate])
 
   it "throws the failure of what was forked also if the scoped behaviour is just forking" $
     for_ [1 .. 300] $ \n -> do
       end <- ending . scoped $ \nursery -> do
-        _ <- fork nursery (yielding n >> failed) :: IO (STM ())
+        _ <- fork nursery (yielding n >> failed) :: IO (Child ())
         forever (fork nursery (pure ()))
       end `shouldBe` (FailedWith (show Failed) :: Ending ())
 
   it "gives the scoped behaviour's result also if what was forked is just forking" $
     for_ [1 .. 300] $ \n -> do
       end <- ending . scoped $ \nursery -> do
-        _ <- fork nursery (forever (fork nursery (pure ()))) :: IO (STM ())
+        _ <- fork nursery (forever (fork nursery (pure ()))) :: IO (Child ())
         yielding n
       end `shouldBe` Gave ()
+
+  describe "what fork returns" children
  where
   yielding n = replicateM_ (n `mod` 20) yield
+
+children :: Spec
+children = do
+  it "gives the result, or throws the failure or the fault, also when scoped has ended" $
+    for_ [(pure 'a', Gave 'a'), (failWith "child", FailedWith (show (FailedBecause "child"))), (throwIO (Fault "child"), FaultedWith (show (Fault "child")))] $
+      \(act, expected) -> do
+        box <- newEmptyMVar
+        end <- ending . scoped $ \nursery -> do
+          mayEnd <- newGate
+          child <- fork nursery (pass mayEnd >> act)
+          putMVar box child
+          atomically (tryAwait child) >>= (`shouldBe` True) . isNothing
+          open mayEnd
+          atomically (await child)
+        end `shouldBe` expected
+        child <- takeMVar box
+        ending (atomically (await child)) `shouldReturn` expected
+        (fmap endingOf <$> atomically (tryAwait child)) `shouldReturn` Just expected
+
+  it "gives a cleanup that awaits a child which has failed that failure" $ do
+    (_, done) <- observing $ \notebook ->
+      scoped $ \nursery -> do
+        inside <- newGate
+        child <- fork nursery (pass inside >> failWith "child") :: IO (Child ())
+        (open inside >> hang) `onException` (ending (atomically (await child)) >>= note notebook) :: IO ()
+    done `shouldBe` [FailedWith (show (FailedBecause "child"))]
+
+  it "gives a cleanup that awaits a child which was stopped with it ChildStopped, when the child's cleanup has ended" $ do
+    (end, done) <- observing $ \notebook ->
+      scoped $ \nursery -> do
+        inside <- newGate
+        inside' <- newGate
+        one <- fork nursery ((open inside >> hang) `onException` note notebook "its cleanup") :: IO (Child ())
+        _ <- fork nursery $ (open inside' >> hang) `onException` (ending (atomically (await one)) >>= note notebook . show)
+        pass inside
+        pass inside'
+    (end, done) `shouldBe` (Gave (), ["its cleanup", show (stopped :: Ending ())])
+
+  it "stops a child when that is requested; the scoped behaviour goes on" $ do
+    (end, done) <- observing $ \notebook ->
+      scoped $ \nursery -> do
+        inside <- newGate
+        child <- fork nursery ((open inside >> hang) `onException` note notebook "its cleanup")
+        other <- fork nursery (pure 'b')
+        pass inside
+        requestStop child
+        ending (atomically (await child)) >>= (`shouldBe` (stopped :: Ending ()))
+        note notebook "goes on"
+        (,) <$> atomically (await other) <*> (fork nursery (pure 'c') >>= atomically . await)
+    (end, done) `shouldBe` (Gave ('b', 'c'), ["its cleanup", "goes on"])
+
+  it "stops a child when another thread, or the child itself, requests that" $
+    scoped $ \nursery -> do
+      one <- fork nursery hang :: IO (Child ())
+      withAsync (requestStop one) $ \_ -> ending (atomically (await one)) `shouldReturn` stopped
+      itself <- newEmptyMVar
+      child <- fork nursery (takeMVar itself >>= requestStop >> hang) :: IO (Child ())
+      putMVar itself child
+      ending (atomically (await child)) `shouldReturn` stopped
+
+  it "does not wait for a child that it asks to stop, and serves others meanwhile" $
+    scoped $ \nursery -> do
+      inside <- newGate
+      mayEnd <- newGate
+      child <- fork nursery (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang) :: IO (Child ())
+      pass inside
+      requestStop child
+      (fork nursery (pure 'a') >>= atomically . await) `shouldReturn` 'a'
+      requestStop child
+      open mayEnd
+      ending (atomically (await child)) `shouldReturn` stopped
+
+  it "asks a child once, however often that is requested, and also when scoped ends" $ do
+    (end, done) <- observing $ \notebook -> do
+      mayEnd <- newGate
+      cleaning <- newGate
+      let body nursery = do
+            inside <- newGate
+            -- An interruptible cleanup.
+            child <- fork nursery ((open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note notebook "to its end"))
+            pass inside
+            requestStop child
+            pass cleaning
+            requestStop child
+            -- It has been served when this is.
+            void (fork nursery (pure ()))
+            pure () :: IO ()
+      launching (scoped body) $ \caller -> do
+        pass cleaning
+        stillRunning caller
+        open mayEnd
+        wait caller
+    (end, done) `shouldBe` (Gave (), ["to its end"])
+
+  it "keeps the result of a child that completes although it was asked to stop" $
+    scoped
+      ( \nursery -> do
+          inside <- newGate
+          child <- fork nursery ((open inside >> hang) `catch` \(_ :: SomeAsyncException) -> pure 'a')
+          pass inside
+          requestStop child
+          atomically (await child)
+      )
+      `shouldReturn` 'a'
+
+  it "throws what the cleanup of a child throws that was asked to stop, a fault or a failure" $
+    for_ [(throwIO (Fault "cleanup"), FaultedWith (show (Fault "cleanup"))), (failWith "cleanup", FailedWith (show (FailedBecause "cleanup")))] $
+      \(cleanup, expected) -> do
+        end <- ending . scoped $ \nursery -> do
+          inside <- newGate
+          child <- fork nursery ((open inside >> hang) `onException` cleanup) :: IO (Child ())
+          pass inside
+          requestStop child
+          hang
+        end `shouldBe` (expected :: Ending ())
+
+  it "throws the failure of another child also when it was asked to stop one" $
+    for_ [1 .. 300 :: Int] $ \n -> do
+      end <- ending . scoped $ \nursery -> do
+        child <- fork nursery hang :: IO (Child ())
+        _ <- fork nursery (replicateM_ (n `mod` 20) yield >> failWith "other") :: IO (Child ())
+        requestStop child
+        hang
+      end `shouldBe` (FailedWith (show (FailedBecause "other")) :: Ending ())
+
+  it "is no fault to request the stop of a child that has ended, while all is being stopped, and outside" $ do
+    (end, done) <- observing $ \notebook -> do
+      child <- scoped $ \nursery -> do
+        ended <- fork nursery (pure 'a')
+        _ <- atomically (await ended)
+        requestStop ended
+        inside <- newGate
+        _ <- fork nursery ((open inside >> hang) `onException` (requestStop ended >> note notebook "went on")) :: IO (Child ())
+        pass inside
+        pure ended
+      requestStop child
+      atomically (await child)
+    (end, done) `shouldBe` (Gave 'a', ["went on"])
+
+  it "loses no stop request, whoever makes it" $
+    for_ [1 .. 100 :: Int] $ \_ ->
+      scoped $ \nursery -> do
+        some <- replicateM 10 (fork nursery hang) :: IO [Child ()]
+        for_ some $ \child -> fork nursery (requestStop child)
+        for_ some $ \child -> ending (atomically (await child)) `shouldReturn` stopped
+
+  it "is stopped with all others when its scoped behaviour ends as its stop is requested" $
+    for_ [1 .. 300 :: Int] $ \n -> do
+      (child, requester) <- scoped $ \nursery -> do
+        child <- fork nursery hang :: IO (Child ())
+        requester <- fork nursery (replicateM_ (n `mod` 20) yield >> requestStop child)
+        replicateM_ (n `mod` 13) yield
+        pure (child, requester)
+      ending (atomically (await child)) `shouldReturn` stopped
+      ending (atomically (await requester)) >>= (`shouldSatisfy` (`elem` [Gave (), stopped]))
+ where
+  stopped = FailedWith (show ChildStopped)

@@ -9,8 +9,9 @@ import Data.IORef
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Parallel (firstOf, fork, scoped)
-import Behavior.Time (atomically, timeout)
+import Behavior.Parallel (await, firstOf, fork, requestStop, scoped, tryAwait)
+import Behavior.STM (atomically, retry)
+import Behavior.Time (timeout)
 import Memory (inConstantMemory)
 import Support
 
@@ -43,9 +44,18 @@ spec = guarded . describe "In constant memory run" $ do
         step >> both (pure ()) (pure ())
         step >> firstOf [pure (), hang, hang]
         step >> timeout 3600 (pure ())
-        step >> scoped (\nursery -> fork nursery (pure ()) >>= atomically)
+        step >> scoped (\nursery -> fork nursery (pure ()) >>= atomically . await)
 
   it "five thousand forks in one scoped behaviour" $
     inConstantMemory 5000 $ \step ->
       scoped $ \nursery ->
-        replicateM_ 5000 (step >> fork nursery (pure ()) >>= atomically)
+        replicateM_ 5000 (step >> fork nursery (pure ()) >>= atomically . await)
+
+  it "five thousand forks in one scoped behaviour, each stopped by its handle" $
+    inConstantMemory 5000 $ \step ->
+      scoped $ \nursery ->
+        replicateM_ 5000 $ do
+          step
+          child <- fork nursery (sleep 3600)
+          requestStop child
+          atomically (tryAwait child >>= maybe retry (const (pure ())))

@@ -14,14 +14,14 @@ import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar)
 import Control.Exception
 import Control.Monad (replicateM_, void)
-import Data.Foldable (for_)
+import Data.Foldable (for_, traverse_)
 import Data.IORef
 import Test.Hspec hiding (parallel)
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
-import Behavior.Parallel (allOf, firstOf, fork, scoped)
+import Behavior.Parallel (allOf, firstOf, fork, requestStop, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically, timeout)
 import Places
@@ -197,6 +197,8 @@ data Tree
   | Races [Tree]
   | Gathers [Tree]
   | Forking Tree [Tree]
+  | -- | The children are asked to stop before the last.
+    Retracting Tree [Tree] Tree
   | Within Double Tree
   | Select Tree Tree
   | Guard Tree Tree
@@ -217,6 +219,7 @@ instance Arbitrary Tree where
             , Races <$> several
             , Gathers <$> several
             , Forking <$> half <*> several
+            , Retracting <$> half <*> several <*> half
             , Within <$> elements [0, 0.0001, 3600] <*> tree (n - 1)
             , Select <$> half <*> half
             , Guard <$> half <*> half
@@ -238,6 +241,9 @@ grow inside weather = go
     Races as -> firstOf (map go as)
     Gathers as -> void (allOf (map go as))
     Forking a as -> scoped (\nursery -> for_ as (fork nursery . go) >> go a)
+    Retracting a as b -> scoped $ \nursery -> do
+      children <- traverse (fork nursery . go) as
+      go a >> traverse_ requestStop children >> go b
     Within s a -> timeout (realToFrac s) (go a)
     Select a b -> Signal.rSelect ((== 0) . (`mod` 2) <$> sky) (go a) (go b)
     Guard a b -> Signal.monitor ((== 0) . (`mod` 3) <$> sky) (go a) (go b)

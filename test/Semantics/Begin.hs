@@ -13,6 +13,7 @@ module Semantics.Begin
   ) where
 
 import qualified Data.Map.Strict as Map
+import qualified Data.Set as Set
 
 import Semantics.Program
 import Semantics.Source
@@ -34,7 +35,7 @@ initial world =
           Called Unasked (Starting (program world)) (changes world) [patience world, patience world + later]
     }
  where
-  start = Now {clock = 0, levels = Map.fromList (conditions world), calls = Map.empty, shared = [], answers = Map.empty}
+  start = Now {clock = 0, levels = Map.fromList (conditions world), calls = Map.empty, shared = [], answers = Map.empty, retracted = Set.empty}
 
 -- | A program that is about to run.
 begin :: Now -> Program -> Running
@@ -57,7 +58,8 @@ begin t p = case p of
   AllOf acts -> Looking Gather (numbered "allOf: " acts)
   Scoped body -> Looking Nursery [thread t "scoped: body" body]
   Fork act -> Forking act Nothing
-  Await act meanwhile -> Forking act (Just meanwhile)
+  Await act meanwhile -> Forking act (Just (False, meanwhile))
+  Retract act meanwhile -> Forking act (Just (True, meanwhile))
   Timeout limit' _ -> Reacting p (Deadline (clock t + limit')) Always (Choosing First)
   _ | any borrows (signals p) -> Opening p
     | otherwise -> opened t p

@@ -37,6 +37,7 @@ parts = \case
   Scoped a -> [a]
   Fork a -> [a]
   Await a b -> [a, b]
+  Retract a b -> [a, b]
 
 ofSignal :: Signal -> [Program]
 ofSignal = \case
@@ -70,6 +71,7 @@ rebuild p new = case (p, new) of
   (Scoped _, [a]) -> Scoped a
   (Fork _, [a]) -> Fork a
   (Await _ _, [a, b]) -> Await a b
+  (Retract _ _, [a, b]) -> Retract a b
   _ -> p
  where
   ruled ((s, _) : rules) as | (s', a : as') <- sensing s as = (s', a) : ruled rules as'

@@ -39,6 +39,8 @@ module Semantics.Program
   , nothingElse
   , noValue
   , doesNotHold
+  , tooLate
+  , childStopped
   , timedOut
   , overdueBy
   , cleanupOf
@@ -81,6 +83,8 @@ data Program
     Fork Program
   | -- | Forks the first, runs the second, and waits for the result of the first.
     Await Program Program
+  | -- | Likewise, but before it waits it asks the first to stop.
+    Retract Program Program
   deriving (Eq, Ord, Show)
 
 -- | A signal carries a number; as a condition it 'holds' or not.
@@ -232,10 +236,12 @@ holds = (> 0)
 
 -- The library's own failures.
 
-nothingElse, noValue, doesNotHold :: String
+nothingElse, noValue, doesNotHold, tooLate, childStopped :: String
 nothingElse = "Failed"
 noValue = "FailedBecause \"the signal has no value any more\""
 doesNotHold = "FailedBecause \"the condition does not hold\""
+tooLate = "FailedBecause \"fork: the nursery's scoped behaviour is ending\""
+childStopped = "ChildStopped"
 
 timedOut :: Ticks -> String
 timedOut n = "TimedOut " ++ show n ++ ".0"

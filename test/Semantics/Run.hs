@@ -32,7 +32,8 @@ import qualified Data.Set as Set
 
 import Behavior.Internal.Failure hiding (Failed (..))
 import Behavior.Internal.Filter
-import Behavior.Internal.Parallel
+import Behavior.Internal.Nursery
+import Behavior.Internal.Parallel (allOf, both, firstOf, parallel)
 import Behavior.Internal.Reactive
 import Behavior.Internal.Runtime hiding (Event (..), Label)
 import Behavior.Internal.Sensor
@@ -116,7 +117,7 @@ observing simulated world = do
 data Stage = Stage
   { levels :: Map Condition (TVar Level)
   , calls :: IORef (Map Name Int)
-  , forking :: Behavior Value -> Behavior (STM Value)
+  , forking :: Behavior Value -> Behavior (Child Value)
   , nearest :: Library.Signal Int
   }
 
@@ -176,7 +177,8 @@ play tell stage = go
     WithShared signal p -> withShared (level signal) (\s -> play tell stage {nearest = s} p)
     Scoped body -> scoped (\nursery -> play tell stage {forking = fork nursery} body)
     Fork p -> Unit <$ forking stage (go p)
-    Await p q -> forking stage (go p) >>= \result -> go q >> atomically result
+    Await p q -> forking stage (go p) >>= \child -> go q >> atomically (await child)
+    Retract p q -> forking stage (go p) >>= \child -> go q >> requestStop child >> atomically (await child)
   level = \case
     Watched condition -> watching (reading condition)
     Polled every p -> number <$> polling (fromIntegral every) (go p)

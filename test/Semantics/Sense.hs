@@ -25,6 +25,8 @@ data Action
   = Happens Event
   | -- | Perhaps an answer is wanted, by that number.
     Forks (Maybe Int) Program
+  | -- | It fails to fork, which is so only while its nursery is ending.
+    Refused
 
 type Steps a = [(Action, Now, a)]
 

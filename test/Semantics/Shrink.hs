@@ -33,6 +33,7 @@ strays = go False False
   go inScope sharing p = case p of
     Fork a -> not inScope || go inScope sharing a
     Await a b -> not inScope || any (go inScope sharing) [a, b]
+    Retract a b -> not inScope || any (go inScope sharing) [a, b]
     Scoped a -> go True sharing a
     WithShared s a -> ofSignals inScope sharing [s] || go False True a
     _ -> ofSignals inScope sharing (signals p) || any (go inScope sharing) (parts p)

@@ -36,6 +36,7 @@ module Semantics.State
 
 import Data.Map.Strict (Map)
 import Data.Maybe (isJust)
+import Data.Set (Set)
 
 import Semantics.Filter
 import Semantics.Program
@@ -54,8 +55,10 @@ data Now = Now
   -- ^ How often an action was called; those to come all follow the last script.
   , shared :: [Source]
   -- ^ Those that are shared around the part which takes a step, the nearest first.
-  , answers :: Map Int (Maybe Value)
-  -- ^ The results for which somebody waits, or will.
+  , answers :: Map Int (Maybe Result)
+  -- ^ How the children have ended for which somebody waits, or will.
+  , retracted :: Set Int
+  -- ^ Those of them that are to be stopped, which their nursery has yet to find.
   }
   deriving (Eq, Ord, Show)
 
@@ -85,13 +88,15 @@ data Running
   | -- | The operator has come to a verdict, and waits for those whom it has asked to stop.
     Concluding Operator Result Source [Thread]
   | -- | It is about to fork the one. If it then waits for the result, it runs the other
-    -- before.
-    Forking Program (Maybe Program)
+    -- before; and it is said whether the one is asked to stop then.
+    Forking Program (Maybe (Bool, Program))
   | -- | What it forks has started.
-    Forked (Maybe (Int, Program))
-  | -- | When this is over, it waits for that answer.
+    Forked (Maybe (Int, Bool, Program))
+  | -- | When this is over, it asks that child to stop, and then waits for it.
+    Retracting Int Running
+  | -- | When this is over, it waits for that child.
     Obtaining Int Running
-  | -- | When this is over, it gives that answer.
+  | -- | It is that child.
     Answering Int Running
   | -- | The environment, with the changes to come.
     Changing [Change] Ticks
@@ -118,6 +123,8 @@ data Life
   = Living Request Running
   | -- | It has ended, but that is not yet known.
     Finished Result
+  | -- | Likewise, and it is the child of this number.
+    FinishedChild Int Result
   | Ended Result
   deriving (Eq, Ord, Show)
 
@@ -237,6 +244,7 @@ moments = \case
   Tidying _ until' -> [until']
   first `AndThen` _ -> moments first
   first `OrElse` _ -> moments first
+  Retracting _ r -> moments r
   Obtaining _ r -> moments r
   Answering _ r -> moments r
   Looking _ threads -> ofThreads threads

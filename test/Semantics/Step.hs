@@ -67,6 +67,7 @@ steps t = \case
       Just result -> silently t (conclude operator result nothing threads)
       Nothing -> []
       ++ concatMap (serve operator) (oneOf (threadSteps t) threads)
+      ++ (if operator == Nursery then retract threads else [])
   -- A reading that begins before it looks does not count.
   Opening p -> silently t (opened t p)
   Reacting p source v phase ->
@@ -82,26 +83,32 @@ steps t = \case
     | rested source, all over threads -> silently t (Over (outcome operator result source threads))
     | otherwise ->
         [(l, t', concluding operator result source' threads) | (l, t', source') <- sourceSteps steps hear t source]
-          ++ [ (if operator == Nursery then refuse l else l, t', concluding operator result source' threads')
+          ++ [ (l', t', concluding operator result source' threads')
              | (l, t', (source', threads')) <- branches
+             , l' <- if operator == Nursery then refuse l else [l]
              ]
    where
     branches
       | operator == Share = lending source (\t' -> oneOf (threadSteps t') threads)
       | otherwise = [(l, t', (source, threads')) | (l, t', threads') <- oneOf (threadSteps t) threads]
-  Forking p Nothing -> [(Forks Nothing p, t, Forked Nothing)]
-  Forking p (Just meanwhile) ->
-    let k = length (takeWhile id (zipWith (==) [0 ..] (Map.keys (answers t))))
-     in [(Forks (Just k) p, t {answers = Map.insert k Nothing (answers t)}, Forked (Just (k, meanwhile)))]
+  Forking p wanted ->
+    (Refused, t, Over (Failed tooLate)) : case wanted of
+      Nothing -> [(Forks Nothing p, t, Forked Nothing)]
+      Just (stops, meanwhile) ->
+        let k = length (takeWhile id (zipWith (==) [0 ..] (Map.keys (answers t))))
+         in [(Forks (Just k) p, t {answers = Map.insert k Nothing (answers t)}, Forked (Just (k, stops, meanwhile)))]
   Forked Nothing -> silently t (Over (Succeeded Unit))
-  Forked (Just (k, meanwhile)) -> silently t (whenSuccessful (Obtaining k) (begin t meanwhile))
+  Forked (Just (k, stops, meanwhile)) ->
+    silently t (whenSuccessful ((if stops then Retracting else Obtaining) k) (begin t meanwhile))
+  Retracting k (Over _) ->
+    silently t {retracted = Set.insert k (retracted t)} (Obtaining k (Over (Succeeded Unit)))
+  Retracting k r -> [(l, t', whenSuccessful (Retracting k) r') | (l, t', r') <- steps t r]
   Obtaining k (Over _) -> case Map.lookup k (answers t) of
-    Just (Just value) -> silently t {answers = Map.delete k (answers t)} (Over (Succeeded value))
+    Just (Just result) ->
+      silently t {answers = Map.delete k (answers t), retracted = Set.delete k (retracted t)} (Over result)
     _ -> []
   Obtaining k r -> [(l, t', whenSuccessful (Obtaining k) r') | (l, t', r') <- steps t r]
-  Answering k (Over (Succeeded value)) ->
-    silently t {answers = Map.insert k (Just value) (answers t)} (Over (Succeeded value))
-  Answering k r -> [(l, t', whenSuccessful (Answering k) r') | (l, t', r') <- steps t r]
+  Answering k r -> [(l, t', Answering k r') | (l, t', r') <- steps t r]
   Changing (Change at condition level : others) end -> changing at condition level (Changing others end)
   Changing [] end -> if clock t >= end then silently t (Over (Succeeded timeIsUp)) else []
   Called _ (Over result) [] [] -> silently t (Over result)
@@ -130,18 +137,34 @@ steps t = \case
   serve Nursery (Forks wanted p, t', threads)
     | Nothing <- verdict Nursery threads = silently t' (Looking Nursery (threads ++ [forked t' wanted p]))
     | otherwise = []
+  serve Nursery (Refused, _, _) = []
   serve Nursery (l, t', threads) = [(l, t', Looking Nursery (withoutCompleted threads))]
   serve operator (l, t', threads) = [(l, t', Looking operator threads)]
-  -- What is forked while all is being stopped never starts.
+  -- While all is being stopped to fork fails.
   refuse = \case
-    Forks _ _ -> Happens Silent
-    l -> l
+    Forks _ _ -> []
+    Refused -> [Happens Silent]
+    l -> [l]
+  -- It asks a child to stop that was retracted.
+  retract threads =
+    [ (Happens Silent, t {retracted = Set.delete k (retracted t)}, Looking Nursery (map (\c -> if isChild k c then ask c else c) threads))
+    | Nothing <- [verdict Nursery threads]
+    , k <- Set.toList (retracted t)
+    , any (isChild k) threads
+    ]
+  isChild k = \case
+    Thread _ (Living _ (Answering k' _)) -> k == k'
+    _ -> False
   forked t' = \case
     Nothing -> thread t' "scoped: fork"
     Just k -> Thread "scoped: fork" . Living Unborn . Answering k . Starting
   withoutCompleted = \case
-    main : others -> main : filter (not . completed) others
+    main : others -> main : filter (not . harmless) others
     [] -> []
+  harmless child = case endOf child of
+    Just (Succeeded _) -> True
+    Just (Stopped Nothing) -> True
+    _ -> False
 
 -- | What comes after it if it has not gone wrong.
 whenSuccessful :: (Running -> Running) -> Running -> Running
@@ -201,8 +224,9 @@ hear t = \case
     | otherwise -> []
   first `AndThen` second -> fmap (\r -> andThen t r second) <$> hear t first
   first `OrElse` second -> fmap (\r -> orElse t r second) <$> hear t first
+  Retracting k r -> within' (Retracting k) r
   Obtaining k r -> within' (Obtaining k) r
-  Answering k r -> within' (Answering k) r
+  Answering k r -> fmap (Answering k) <$> hear t r
   Looking operator threads -> [(Silent, conclude operator (Stopped Nothing) nothing some) | some <- started threads]
   Reacting _ source _ phase -> [(Silent, conclude React (Stopped Nothing) source some) | some <- started (threadsOf phase)]
   Sharing source body -> [(Silent, conclude Share (Stopped Nothing) source some) | some <- started [body]]
@@ -235,18 +259,26 @@ hear t = \case
 threadSteps :: Now -> Thread -> Steps Thread
 threadSteps t (Thread label life) = case life of
   -- It has done all that it does, and can still be stopped.
-  Living asks (Returning result) ->
-    [ends' result | not (isPending asks)]
-      ++ [(Happens Silent, t, Thread label (Finished (Stopped Nothing))) | Just _ <- [heard asks]]
+  Living asks (Returning result) -> returning Finished asks result
+  Living asks (Answering k (Returning result)) -> returning (FinishedChild k) asks result
   Living asks r -> [(l, t', becomes asks' r') | (l, t', asks', r') <- running' t asks r]
-  Finished result -> [ends' result]
+  Finished result -> [ends' t result]
+  FinishedChild k result -> [ends' t {answers = Map.insert k (Just (answer (asOutcome result))) (answers t)} result]
   Ended _ -> []
  where
+  returning finished asks result =
+    [over' | not (isPending asks), over' <- threadSteps t (Thread label (finished result))]
+      ++ [(Happens Silent, t, Thread label (finished (Stopped Nothing))) | Just _ <- [heard asks]]
   becomes asks = \case
     Over result@(Succeeded _) -> Thread label (Living asks (Returning result))
+    Answering k (Over result@(Succeeded _)) -> Thread label (Living asks (Answering k (Returning result)))
+    Answering k (Over result) -> Thread label (FinishedChild k (asOutcome result))
     Over result -> Thread label (Finished (asOutcome result))
     r -> Thread label (Living asks r)
-  ends' result = (Happens (IsOver label), t, Thread label (Ended (asOutcome result)))
+  ends' t' result = (Happens (IsOver label), t', Thread label (Ended (asOutcome result)))
+  answer = \case
+    Stopped _ -> Failed childStopped
+    result -> result
 
 -- * Reactive operators
 

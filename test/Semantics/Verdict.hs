@@ -32,10 +32,11 @@ verdict operator threads = case operator of
   Gather
     | all completed threads -> Just (Succeeded (Several [value | Succeeded value <- ends']))
     | otherwise -> firstOf wrongs
-  -- The body, however it ends; or what was forked, when it goes wrong.
+  -- The body, however it ends; or what was forked, when it goes wrong (which it does not
+  -- when it is stopped).
   Nursery -> case threads of
     body : _ | over body -> endOf body
-    _ -> firstOf wrongs
+    _ -> firstOf (filter (/= Stopped Nothing) wrongs)
   React -> Nothing
  where
   ends' = mapMaybe endOf threads

@@ -37,9 +37,14 @@ module Behavior.Internal.Failure
 
     -- * What to do when something fails
   , fallback
+  , fallbackWith
   , (?)
   , fallbackOver
   , attempt
+
+    -- * What to do about a fault
+  , tryAny
+  , catchAny
   ) where
 
 import Control.Exception
@@ -153,7 +158,8 @@ failWith = throwM . FailedBecause
 -- @chosen@, it fails with that @e@ inside a 'BehaviorFailed'.
 --
 -- A failure stays the failure it is, and an asynchronous exception is never
--- turned into anything, whatever type is asked for.
+-- turned into anything, whatever type is asked for. Like '?' it goes by type, in the
+-- caller's thread.
 --
 -- >>> import System.IO.Error
 -- >>> let readSensor = readFile "/no/such/device"
@@ -199,6 +205,10 @@ catchSynchronous act handler = act `catch` \e -> if isCancellation e then throwI
 -- own masking state (never inside an exception handler, where it could not be
 -- interrupted). What @second@ throws is thrown.
 --
+-- It goes by the type of the exception, in the caller's thread: a failure that another
+-- thread throws to the caller (by 'Control.Exception.throwTo') while @first@ runs counts as
+-- the failure of @first@.
+--
 -- A chain that nests to the right, as '?' does, runs in constant space.
 --
 -- >>> fallback (failWith "locked") (putStrLn "smash it")
@@ -215,14 +225,32 @@ fallback first second =
     Left BehaviorFailed {} -> second
 {-# INLINE fallback #-}
 
+-- | 'fallback' where the second behaviour is given the failure.
+--
+-- > fallbackWith (pure a) b    =  pure a
+-- > fallbackWith failed b      =  b (BehaviorFailed Failed)
+-- > fallbackWith a (const b)   =  fallback a b
+--
+-- Faults and cancellations of the first pass through. The second runs as it does in
+-- 'fallback': in the caller's own masking state, outside of any exception handler. What it
+-- throws is thrown.
+--
+-- >>> fallbackWith (failWith "locked") (\why -> putStrLn ("smash it: " ++ show why))
+-- smash it: FailedBecause "locked"
+--
+-- @since 0.1.0.0
+fallbackWith :: Behavior a -> (BehaviorFailed -> Behavior a) -> Behavior a
+fallbackWith first second = try first >>= either second pure
+{-# INLINE fallbackWith #-}
+
 -- | 'fallback' as an operator. It binds tighter than @|||@ and 'Prelude.>>', and
 -- nests to the right.
 --
 -- >>> failed ? failed ? pure "the third"
 -- "the third"
 --
--- Under @ImplicitParams@ write spaces around it. To 'fallback' belongs all the
--- rest that there is to say.
+-- Under @ImplicitParams@ write spaces around it. It goes by the type of the exception, in
+-- the caller's thread; for this and all else see 'fallback'.
 --
 -- @since 0.1.0.0
 (?) :: Behavior a -> Behavior a -> Behavior a
@@ -260,7 +288,8 @@ fallbackOver inputs act = case toList inputs of
 -- > attempt (n + 1) act  =  act ? attempt n act
 --
 -- The last failure is thrown as it is. With @n <= 0@ it fails at once with
--- 'Failed', and nothing runs. Faults and cancellations pass through at once.
+-- 'Failed', and nothing runs. Faults and cancellations pass through at once. Like '?' it
+-- goes by type, in the caller's thread.
 --
 -- >>> attempt 3 (putStrLn "push" >> failed)
 -- push
@@ -278,3 +307,37 @@ attempt n act
   | n <= 0 = failed
   | n == 1 = act
   | otherwise = act ? attempt (n - 1) act
+
+-- | Runs a behaviour and gives its result, or the failure or fault that it threw.
+--
+-- > tryAny (pure a)     =  pure (Right a)
+-- > tryAny (throwIO e)  =  pure (Left (toException e))  -- unless e is asynchronous
+--
+-- A cancellation passes through. What is one goes by type, in the caller's thread: every
+-- exception under 'SomeAsyncException', and no other. So an exception of a synchronous type
+-- that another thread throws to the caller counts as the behaviour's own.
+--
+-- Use it where a fault must not end the program (around each of many missions, say). For
+-- what the robot could not do there is '?'.
+--
+-- >>> tryAny (failWith "locked" :: Behavior ())
+-- Left (FailedBecause "locked")
+--
+-- @since 0.1.0.0
+tryAny :: Behavior a -> Behavior (Either SomeException a)
+tryAny = trySynchronous
+
+-- | Runs a behaviour, and the second with the failure or fault that it threw.
+--
+-- > catchAny act handler  =  tryAny act >>= either handler pure
+--
+-- A cancellation passes through, by the same rule as in 'tryAny'. The second runs in the
+-- caller's own masking state, outside of any exception handler, where it can be
+-- interrupted. What it throws is thrown.
+--
+-- >>> catchAny (readFile "/no/such/map") (\_ -> pure "an empty map")
+-- "an empty map"
+--
+-- @since 0.1.0.0
+catchAny :: Behavior a -> (SomeException -> Behavior a) -> Behavior a
+catchAny act handler = tryAny act >>= either handler pure

@@ -1,25 +1,15 @@
-{-# LANGUAGE CPP #-}
-
 -- |
 -- The life of a program.
 module Behavior.Internal.Program
   ( runBehavior
   ) where
 
-import Control.Concurrent.STM (newTVarIO, orElse, readTVar, retry, writeTVar)
+import Control.Concurrent.STM (orElse)
 import Control.Exception (throwIO)
 import System.Exit (ExitCode (..))
 
-#if !defined(mingw32_HOST_OS)
-import Control.Concurrent.STM.TVar (mkWeakTVar)
-import Control.Exception (bracket)
-import Data.Foldable (for_, traverse_)
-import Data.Traversable (for)
-import System.Mem.Weak (deRefWeak)
-import System.Posix.Signals (Handler (..), Signal, installHandler, sigINT, sigTERM)
-#endif
-
 import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.ProcessSignals (withSignals)
 import Behavior.Internal.Runtime (Label (..), atomically)
 import Behavior.Internal.Scope
 
@@ -27,41 +17,34 @@ import Behavior.Internal.Scope
 -- run.
 --
 -- * It runs in an unbound thread. In the thread of @main@, which is bound, each
---   thread switch would be a system call. (An action that needs a bound thread asks
---   for one with 'Control.Concurrent.runInBoundThread'.)
+--   thread switch would be a system call.
 -- * The first SIGINT (Ctrl-C) or SIGTERM cancels the behaviour. When that has
 --   ended, cleanup included, the process ends with 130 or 143. A second signal ends
 --   it at once.
 --
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
--- instead of the exit. Signals belong to the whole process: run one at a time.
+-- instead of the exit. A signal that comes too late to cancel the behaviour is raised
+-- again, for the handler that was there before: no signal is without effect. (After the
+-- behaviour SIGINT and SIGTERM do what they did before it. Where that was the default, a
+-- handler does it, so 'System.Posix.Signals.installHandler' shows one.)
+--
+-- Call it in the thread of @main@. In a thread of 'Control.Concurrent.forkIO' the exit code
+-- is thrown in that thread: the behaviour is cancelled, and the process goes on. When
+-- @main@ returns, the process ends and no cleanup of other threads runs. Signals belong to
+-- the whole process: where several behaviours run so, one inside the other or side by side,
+-- a signal cancels all of them.
+--
+-- An action that needs a bound thread can have one by
+-- 'Control.Concurrent.runInBoundThread', but then nothing interrupts it: a stop request
+-- waits until the action has returned. With @withAsyncBound act wait@ (of the package
+-- async) it can be interrupted.
 --
 -- >>> runBehavior (pure "done")
 -- "done"
 --
 -- @since 0.1.0.0
 runBehavior :: Behavior a -> IO a
-runBehavior behavior = do
-  exit <- newTVarIO Nothing
-  handlingSignals exit . structured $ \scope -> do
+runBehavior behavior = withSignals $ \exitCode ->
+  structured $ \scope -> do
     program <- branch scope (Label "runBehavior" "program") behavior
-    atomically $
-      (settle <$> outcome program)
-        `orElse` (readTVar exit >>= maybe retry (pure . throwIO . ExitFailure))
- where
-#if defined(mingw32_HOST_OS)
-  handlingSignals _ = id
-#else
-  handlingSignals exit act = do
-    -- A weak reference: the handlers must not keep the waiting thread reachable,
-    -- or GHC would not notice when everything is deadlocked.
-    weakly <- mkWeakTVar exit (pure ())
-    let end code = do
-          for_ signals $ \(signal, _) -> installHandler signal Default Nothing
-          deRefWeak weakly >>= traverse_ (\there -> atomically (writeTVar there (Just code)))
-        install = for signals $ \(signal, code) ->
-          (,) signal <$> installHandler signal (Catch (end code)) Nothing
-        restore = traverse_ (\(signal, old) -> installHandler signal old Nothing)
-    bracket install restore (const act)
-  signals = [(sigINT, 130), (sigTERM, 143)] :: [(Signal, Int)]
-#endif
+    atomically $ (settle <$> outcome program) `orElse` (throwIO . ExitFailure <$> exitCode)

@@ -1,0 +1,164 @@
+{-# LANGUAGE CPP #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- SIGINT and SIGTERM, which belong to the whole process.
+--
+-- GHC calls a handler in a new thread, some time after the signal: by then the run that
+-- installed it may have ended, and another may have begun. So the handler here is one and
+-- the same for all runs, and looks who is running when it is called. No signal is lost:
+--
+-- (A) While something runs, all that runs receives the signal.
+--
+-- (B) When nothing runs any more, the signal is raised again for the handler that was there
+--     before the run.
+--
+-- (C) A signal whose handler GHC has yet to call is dropped when that handler is replaced by
+--     the default. So where the default was before, this handler stays, and (B) is what it
+--     does.
+module Behavior.Internal.ProcessSignals
+  ( withSignals
+  ) where
+
+#if defined(mingw32_HOST_OS)
+import Control.Concurrent.STM (STM, retry)
+
+-- | Runs the action with a transaction that waits for a signal. (There is none here.)
+withSignals :: (STM Int -> IO a) -> IO a
+withSignals act = act retry
+#else
+import Control.Concurrent.MVar (MVar, modifyMVar, modifyMVar_, newMVar)
+import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
+import Control.Concurrent.STM.TVar (mkWeakTVar)
+import Control.Exception (bracket, uninterruptibleMask_)
+import Control.Monad (void)
+import Data.Foldable (for_)
+import Data.Maybe (catMaybes)
+import Data.Traversable (for)
+import System.IO.Unsafe (unsafePerformIO)
+import System.Mem.StableName (eqStableName, makeStableName)
+import System.Mem.Weak (Weak, deRefWeak)
+import System.Posix.Signals (Handler (..), Signal, installHandler, raiseSignal, sigINT, sigTERM)
+
+import Behavior.Internal.Runtime (atomically)
+
+-- | Runs the action with a transaction that waits for a signal, and gives the exit code
+-- that stands for it. A signal that came while the action ran, but was not taken by that
+-- transaction, is raised again when the action has ended.
+withSignals :: (STM Int -> IO a) -> IO a
+withSignals act = bracket enter leave $ \(_, state) ->
+  act $
+    readTVar state >>= \case
+      Received signal -> exitCode signal <$ writeTVar state Taken
+      _ -> retry
+
+-- | Whether a run has been sent a signal.
+data State
+  = Undisturbed
+  | Received Signal
+  | Taken
+  deriving (Eq)
+
+-- | What the handler has to know.
+data Process = Process
+  { runs :: [(Int, Weak (TVar State))]
+  -- ^ What has not ended, each with its number, the newest first. The references are weak:
+  -- the handler must not keep a waiting thread reachable, or GHC would not notice when
+  -- everything is deadlocked.
+  , before :: [(Signal, Handler)]
+  -- ^ The handlers that were there before the first of these runs.
+  , pending :: Maybe Signal
+  -- ^ What the runs have received, unless one has taken it.
+  , defaulted :: Bool
+  -- ^ Whether the first signal has come: the next ends the process at once.
+  }
+
+process :: MVar Process
+process = unsafePerformIO (newMVar nothingRuns)
+{-# NOINLINE process #-}
+
+nothingRuns :: Process
+nothingRuns = Process {runs = [], before = [], pending = Nothing, defaulted = False}
+
+-- | A run begins. (One that begins while others are being stopped belongs to a cleanup; the
+-- second signal ends it with them.)
+enter :: IO (Int, TVar State)
+enter = do
+  state <- newTVarIO Undisturbed
+  weakly <- mkWeakTVar state (pure ())
+  modifyMVar process $ \known -> do
+    installed <- if null (runs known) then install else pure known
+    let n = 1 + maximum (0 : map fst (runs installed))
+    pure (installed {runs = (n, weakly) : runs installed}, (n, state))
+ where
+  install = do
+    old <- for handlers $ \(signal, handler) -> do
+      handlerBefore <- installHandler signal handler Nothing
+      -- (C)
+      stayed <- isOurs signal handlerBefore
+      pure (signal, if stayed then Default else handlerBefore)
+    pure nothingRuns {before = old}
+
+-- | A run has ended.
+leave :: (Int, TVar State) -> IO ()
+leave (n, state) = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
+  end <- readTVarIO state
+  let left = known {runs = filter ((/= n) . fst) (runs known), pending = if end == Taken then Nothing else pending known}
+  if null (runs left) then nothingRuns <$ restore left else pure left
+ where
+  restore left = do
+    for_ (before left) $ \case
+      (_, Default) -> pure ()
+      (signal, handler) -> void (installHandler signal handler Nothing)
+    for_ (pending left) raiseSignal
+
+-- | What is done at a signal.
+received :: Signal -> IO ()
+received signal = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
+  there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
+  case there of
+    -- (B)
+    [] -> known <$ passOn signal
+    _
+      -- It came with the first one, before the default was there.
+      | defaulted known -> pure known
+      | otherwise -> do
+          atomically (for_ there (`writeTVar` Received signal))
+          for_ handlers $ \(each, _) -> installHandler each Default Nothing
+          pure known {pending = Just signal, defaulted = True}
+
+-- | Raises the signal for the handler that is there; where it is ours, the default was
+-- there before.
+passOn :: Signal -> IO ()
+passOn signal = do
+  -- To look at a handler is to replace it. With ours in its place nothing is lost meanwhile.
+  for_ (lookup signal handlers) $ \ours -> do
+    there <- installHandler signal ours Nothing
+    stayed <- isOurs signal there
+    installHandler signal (if stayed then Default else there) Nothing
+  raiseSignal signal
+
+-- | Whether it is the handler that this module installs.
+isOurs :: Signal -> Handler -> IO Bool
+isOurs signal there = case (lookup signal handlers, there) of
+  (Just (Catch ours), Catch act) -> do
+    ourName <- ours `seq` makeStableName ours
+    name <- act `seq` makeStableName act
+    pure (eqStableName ourName name)
+  _ -> pure False
+
+-- | The handlers, which exist once.
+handlers :: [(Signal, Handler)]
+handlers = [(sigINT, Catch onInterrupt), (sigTERM, Catch onTermination)]
+{-# NOINLINE handlers #-}
+
+onInterrupt, onTermination :: IO ()
+onInterrupt = received sigINT
+onTermination = received sigTERM
+{-# NOINLINE onInterrupt #-}
+{-# NOINLINE onTermination #-}
+
+-- | What a shell shows of a process that the signal has ended.
+exitCode :: Signal -> Int
+exitCode signal = 128 + fromIntegral signal
+#endif

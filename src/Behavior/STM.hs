@@ -1,0 +1,28 @@
+{-# LANGUAGE CPP #-}
+
+-- |
+-- Transactional variables: all of the package stm, with this library's 'atomically'.
+--
+-- Import this module in place of "Control.Concurrent.STM": it exports all of that but
+-- @registerDelay@, whose time cannot be simulated ('Behavior.Time.sleep' and
+-- 'Behavior.Time.timeout' can). The @atomically@ of stm works, too, until the behaviour is
+-- simulated ("Behavior.Sim"): the simulator does not see a thread that waits by it.
+--
+-- >>> door <- newTVarIO False
+-- >>> both (atomically (readTVar door >>= check)) (atomically (writeTVar door True))
+--
+-- To make or read a variable outside of a transaction ('newTVarIO', 'readTVarIO') never waits.
+module Behavior.STM
+  ( atomically
+#ifndef __HADDOCK_VERSION__
+    -- Haddock would list the whole package here.
+  , module Control.Concurrent.STM
+#endif
+  ) where
+
+import Control.Concurrent.STM hiding (atomically, registerDelay)
+
+import Behavior.Internal.Runtime (atomically)
+
+-- $setup
+-- >>> import Behavior (both)
