@@ -1,4 +1,4 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak reality ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -15,6 +15,7 @@ help:
 	@echo 'make bench     what it costs, and whether that is as promised (KEEP=1 keeps the ratios;'
 	@echo '               make bench-check: is anything slower than in those that are kept?)'
 	@echo 'make soak      ever more random schedules and programs (SECONDS=600 for ten minutes)'
+	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
 	@echo 'make clean     remove what was built'
 
 demo:
@@ -38,6 +39,9 @@ bench-check:
 
 soak:
 	@.ci/soak $(or $(SECONDS),300)
+
+reality:
+	@.ci/reality $(SEED)
 
 ci:
 	@.ci/run
