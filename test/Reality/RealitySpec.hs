@@ -59,6 +59,12 @@ specWith effort = do
       readIORef wrong >>= \them -> map show them `shouldBe` []
       (several, count) <- programsWithSeveral <$> readIORef total
       2 * several `shouldSatisfy` (>= count)
+  describe "A masked branch that is woken by another capability, and has not run since," . around_ (within 60 . leavingNothing) $
+    it "may be stopped, in reality as in the simulation" $ do
+      outcomes <- inReality (seed effort) 1000 woken
+      Just (_, right) <- explored id 10000 woken
+      right `shouldBe` Set.fromList [": Gave 'p'", "a: Gave 'p'"]
+      Set.difference outcomes right `shouldBe` Set.empty
   describe "It is noticed when an exception waits for its sender to have the turn" . around_ (within 60 . leavingNothing) $ do
     it "by what GHC fixes" $ do
       let differs fixed = (/= Set.singleton (says fixed)) <$> randomOutcomes 50 (late (program fixed))
@@ -74,3 +80,7 @@ specWith effort = do
 -- | The branch is asked to stop before it unmasks: it does so inside of onException.
 raisedInside :: Program
 raisedInside = Parallel (Note 'a') (OnException (Uninterruptible (Note 'b')) (Note 'c'))
+
+-- | The second branch is blocked in a transaction when the first opens the gate, and ends.
+woken :: Program
+woken = Parallel (Then (Await 1) (Open 0)) (Masked (Then (Open 1) (Then (Await 0) (Note 'a'))))
