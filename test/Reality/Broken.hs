@@ -11,7 +11,7 @@ module Reality.Broken
 
 import Control.Concurrent (ThreadId, myThreadId)
 import Control.Concurrent.STM (TVar, atomically, check, modifyTVar', newTVarIO, readTVar, readTVarIO)
-import Control.Exception (MaskingState (..), SomeException, getMaskingState, uninterruptibleMask_)
+import Control.Exception (MaskingState (..), SomeException (..), catch, getMaskingState, uninterruptibleMask_)
 import Control.Monad (void, when)
 import Data.Set (Set)
 import qualified Data.Set as Set
@@ -36,7 +36,7 @@ lately s shut =
     , send = \target e -> do
         waits <- Set.member target <$> readTVarIO shut
         if waits
-          then void (spawn s (Label "interrupt" "messenger") (\_ _ -> uninterruptibleMask_ (throws target e)) pure)
+          then void (spawn s (Label "interrupt" "messenger") (\_ _ -> thatEnds (uninterruptibleMask_ (throws target e))) pure)
           else send s target e
     , transact = after . transact s
     , clock = after (clock s)
@@ -50,6 +50,9 @@ lately s shut =
     waits <- Set.member target . Set.delete self <$> readTVarIO shut
     when waits (transact s (readTVar shut >>= check . Set.notMember target))
     after (deliver s target e)
+  -- When the run has ended, what it waits for is thrown to it.
+  thatEnds :: IO () -> IO ()
+  thatEnds act = act `catch` \(SomeException _) -> pure ()
   after :: IO a -> IO a
   after operation = do
     self <- myThreadId

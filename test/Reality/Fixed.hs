@@ -75,7 +75,7 @@ thrownTo target = do
 
 targets :: [Fixed]
 targets =
-  [ Fixed "is interrupted where it is blocked" "threw a" $ thrownTo (\_ -> nothing)
+  [ Fixed "is interrupted where it is blocked" "threw a" $ thrownTo (const nothing)
   , Fixed "is interrupted where it is blocked, masked" "threw a" $ thrownTo (\_ -> mask_ nothing)
   , Fixed "is interrupted where it waits to acquire, and releases nothing" "threw a" $
       thrownTo (\say -> bracket nothing (\_ -> say "release") (\_ -> say "use"))
@@ -117,10 +117,10 @@ targets =
         mask_ (say >> interruptible say >> uninterruptibleMask_ (say >> interruptible say) >> say)
         mask (\restore -> restore say >> mask (\restore' -> restore' say))
         uninterruptibleMask (\restore -> mask_ say >> restore say)
-        throwIO (Fault "x") `catch` \e -> const say (e :: Fault)
-        uninterruptibleMask_ (throwIO (Fault "x") `catch` \e -> const say (e :: Fault))
-        (throwIO (Fault "x") `onException` say) `catch` \e -> const (interruptible say) (e :: Fault)
-        bracket say (const say) (const say)
+        throwIO (Fault "x") `catch` \(Fault _) -> say
+        uninterruptibleMask_ (throwIO (Fault "x") `catch` \(Fault _) -> say)
+        (throwIO (Fault "x") `onException` say) `catch` \(Fault _) -> interruptible say
+        bracket_ say say say
         say
       _ <- endOf t
       unwords <$> notes book
@@ -133,7 +133,7 @@ targets =
 
 unmasking :: [Fixed]
 unmasking =
-  [ Fixed "it is raised, though nothing follows" "threw a" $ pending (\waits _ -> waits)
+  [ Fixed "it is raised, though nothing follows" "threw a" $ pending const
   , Fixed "it is raised, and no result is returned" "threw a" $ pending (\waits _ -> "done" <$ waits)
   , Fixed "it is raised before a checkpoint" "threw a" $ pending (\waits _ -> waits >> checkpoint >> pure "done")
   , Fixed "it is raised before the clock is read" "threw a" $ pending (\waits _ -> waits >> now)
@@ -215,19 +215,19 @@ recording say (Cancel name) = say name
 handlers :: [Fixed]
 handlers =
   [ Fixed "it is raised as the handler returns" "1 threw a" $
-      pending (\waits say -> throwIO (Fault "x") `catch` \e -> waits >> say "1" >> const (pure ()) (e :: Fault))
+      pending (\waits say -> throwIO (Fault "x") `catch` \(Fault _) -> waits >> say "1")
   , Fixed "it is raised before what follows the handler" "1 threw a" $
       pending $ \waits say ->
-        (throwIO (Fault "x") `catch` \e -> waits >> say "1" >> const (pure ()) (e :: Fault)) >> say "2"
+        (throwIO (Fault "x") `catch` \(Fault _) -> waits >> say "1") >> say "2"
   , Fixed "it is raised where the handler waits" "1 threw a" $
-      pending (\waits say -> throwIO (Fault "x") `catch` \e -> waits >> say "1" >> hang >> const (say "2") (e :: Fault))
+      pending (\waits say -> throwIO (Fault "x") `catch` \(Fault _) -> waits >> say "1" >> hang >> say "2")
   , Fixed "it is not raised where the handler throws" "1 threw b" $
       pending $ \waits say ->
-        throwIO (Fault "x") `catch` \e -> waits >> say "1" >> throwIO (Cancel "b") >> const (pure ()) (e :: Fault)
+        throwIO (Fault "x") `catch` \(Fault _) -> waits >> say "1" >> throwIO (Cancel "b") >> pure ()
   , Fixed "it is not raised in what catches what the handler throws, but after that" "1 2 threw a" $
       pending $ \waits say ->
-        (throwIO (Fault "x") `catch` \e -> waits >> say "1" >> throwIO (Fault "y") >> const (pure ()) (e :: Fault))
-          `catch` \e -> say "2" >> const (pure ()) (e :: Fault)
+        (throwIO (Fault "x") `catch` \(Fault _) -> waits >> say "1" >> throwIO (Fault "y") >> pure ())
+          `catch` \(Fault _) -> say "2"
   , Fixed "try has returned by then" "threw a" $
       pending (\waits _ -> (try (mask_ (waits >> throwIO (Fault "x"))) :: IO (Either Fault ())))
   , Fixed "a cleanup that waits is interrupted by the second" "threw b" $ do
@@ -321,7 +321,7 @@ itself =
   , Fixed "is raised at once in an uninterruptible mask" "1 2 ()" $
       alone (\say -> uninterruptibleMask_ ((say "1" >> self "a") `catch` \(Cancel _) -> say "2"))
   , Fixed "is raised at once in a handler" "1 threw a" $
-      alone (\say -> throwIO (Fault "x") `catch` \e -> say "1" >> self "a" >> const (say "2") (e :: Fault))
+      alone (\say -> throwIO (Fault "x") `catch` \(Fault _) -> say "1" >> self "a" >> say "2")
   , Fixed "is raised before what is pending" "b 1 threw a" $
       pending (\waits say -> mask_ (waits >> (self "b" `catch` recording say) >> say "1"))
   ]
@@ -340,7 +340,7 @@ operators =
   , Fixed "? does not go on to the second when the first failed in a mask" "threw a" $
       pending (\waits say -> mask_ (waits >> failWith "no") ? say "1")
   , Fixed "whose branch was asked to stop stops it at its unmask" "stopped" $ asked pure
-  , Fixed "whose branch was asked to stop stops it before a checkpoint" "stopped" $ asked (\a -> a <$ checkpoint)
+  , Fixed "whose branch was asked to stop stops it before a checkpoint" "stopped" $ asked (<$ checkpoint)
   , Fixed "whose branch was asked to stop stops it at restore" "stopped" $
       asked (\a -> a <$ mask (\restore -> restore checkpoint))
   , Fixed "parallel stops the loser at its unmask" "()" $ do
