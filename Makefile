@@ -1,4 +1,4 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals reality ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -16,6 +16,7 @@ help:
 	@echo '               make bench-check: is anything slower than in those that are kept?)'
 	@echo 'make soak      ever more random schedules and programs (SECONDS=600 for ten minutes)'
 	@echo 'make signals   SIGINT and SIGTERM at 1,000 random moments each (MOMENTS=100 for fewer)'
+	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
 	@echo 'make clean     remove what was built'
 
 demo:
@@ -42,6 +43,9 @@ soak:
 
 signals:
 	@.ci/signals $(or $(MOMENTS),1000)
+
+reality:
+	@.ci/reality $(SEED)
 
 ci:
 	@.ci/run

@@ -34,6 +34,7 @@ import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
 import qualified Promises.PromisesSimSpec
+import qualified Reality.RealitySpec
 import qualified SemanticsSpec
 import qualified Sim.DeliverySpec
 import qualified Sim.EndSpec
@@ -86,6 +87,7 @@ main = hspec $ do
     Sim.RecordSpec.spec
     Sim.MockSpec.spec
     Sim.QuickCheckSpec.spec
+  describe "Reality" Reality.RealitySpec.spec
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
   describe "Specification" SemanticsSpec.spec
   describe "The paper" $ do

@@ -139,7 +139,7 @@ delivery = do
     asked <- newTVarIO False
     void . simulate $
       parallel
-        (masked (atomically (readTVar asked >>= STM.check) >> operation >> modifyIORef book ("went on" :)))
+        (masked (uninterruptibleMask_ (atomically (readTVar asked >>= STM.check)) >> operation >> modifyIORef book ("went on" :)))
         (atomically (writeTVar asked True) >> (failed :: Behavior ()))
         ? pure ()
     readIORef book

@@ -86,13 +86,13 @@ possible sim = \case
   Moment t -> (t <=) <$> readIORef (time sim)
   Delivery _ p -> readIORef (released p)
   Transaction wouldRun look -> do
-    Look looked was <- readIORef look
+    Look looked was waited <- readIORef look
     n <- readIORef (commits sim)
     if looked == n
       then pure was
       else do
         is <- wouldRun
-        is <$ writeIORef look (Look n is)
+        is <$ writeIORef look (Look n is (waited || not is))
 
 -- | What becomes of an exception that is thrown to a task now.
 data Receives
@@ -101,8 +101,8 @@ data Receives
   | -- | It has ended.
     Never
 
--- | GHC's own rule: an exception is received unmasked, or masked at an operation that has
--- to wait. One that has arrived comes first: its handler, to which the next is thrown, is
+-- | GHC's own rule: an exception is received unmasked, or masked at an operation that has,
+-- or had, to wait. One that has arrived comes first: its handler, to which the next is thrown, is
 -- masked. A thread is masked until it has begun. (One with something pending has not begun
 -- to wait, or it would have received that.)
 receives :: Sim -> Task -> IO Receives
@@ -114,8 +114,17 @@ receives sim target = do
     Before Unmasked _ | not arrived -> pure AtOnce
     Before MaskedInterruptible op | not (arrived || waiting) -> do
       is <- possible sim op
-      pure (if is then Later else AtOnce)
+      waited <- hasWaited op
+      pure (if is && not waited then Later else AtOnce)
     _ -> pure Later
+
+-- | Whether it is a transaction that had to wait. One that was woken by another capability
+-- counts as blocked until it runs again, and receives what is thrown to it meanwhile. (What
+-- waits at an 'Control.Concurrent.MVar', as a sleeper does, does not.)
+hasWaited :: Operation -> IO Bool
+hasWaited = \case
+  Transaction _ look -> (\(Look _ _ waited) -> waited) <$> readIORef look
+  _ -> pure False
 
 -- | The time has come to this moment: the sleepers that are due can run.
 wakeUntil :: Sim -> Seconds -> IO ()

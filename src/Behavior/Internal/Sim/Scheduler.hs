@@ -118,7 +118,7 @@ transaction sim act = do
   detail sim Transacts
   quick <- keeps sim
   done <- if quick then tried else pure Nothing
-  maybe (newIORef (Look (-1) False) >>= waiting) pure done
+  maybe (newIORef (Look (-1) False False) >>= waiting) pure done
  where
   tried = do
     result <- STM.atomically ((Just <$> act) `orElse` pure Nothing)

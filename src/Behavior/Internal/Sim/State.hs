@@ -131,8 +131,9 @@ data Pending = Pending
   -- ^ The task that waits for it to be raised; a messenger does not.
   }
 
--- | Whether a transaction would have run, when so many had been run.
-data Look = Look !Int !Bool
+-- | Whether a transaction would have run, when so many had been run; and whether it ever
+-- would not have: then its task has begun to wait.
+data Look = Look !Int !Bool !Bool
 
 -- | What unwinds a task when the run has ended.
 data Unwind = Unwind

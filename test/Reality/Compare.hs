@@ -1,0 +1,137 @@
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- What comes of random programs on real threads must be among what comes of them in the
+-- simulation.
+module Reality.Compare
+  ( Compared (..)
+  , strange
+  , compareMany
+  , explored
+  , inReality
+
+    -- * Figures
+  , Figures
+  , figures
+  , programsWithSeveral
+  ) where
+
+import Control.Concurrent (yield)
+import Control.Exception (evaluate)
+import Control.Monad (void)
+import Data.Foldable (for_)
+import Data.IORef
+import Data.Set (Set)
+import qualified Data.Set as Set
+
+import Behavior.Sim
+import Reality.Generate
+import Reality.Program
+import Reality.Stage
+import Support (within)
+
+-- | A program, and what came of it.
+data Compared = Compared
+  { compared :: Program
+  , schedulesTried :: Int
+  , simulated :: Set String
+  -- ^ What comes of all schedules that there are.
+  , real :: Set String
+  -- ^ What came of real runs.
+  }
+
+instance Show Compared where
+  show c =
+    unlines
+      [ show (compared c)
+      , "  in reality:        " ++ show (Set.toList (real c))
+      , "  in the simulation: " ++ show (Set.toList (simulated c))
+      ]
+
+-- | The real outcomes that no simulated run has.
+strange :: Compared -> Set String
+strange c = real c `Set.difference` simulated c
+
+-- | Takes the given number of the seed's programs that have no more schedules than the limit,
+-- and runs each the given number of times. The first function is done around what is simulated.
+compareMany :: (IO String -> IO String) -> Int -> Int -> Int -> Int -> (Compared -> IO ()) -> IO ()
+compareMany rule seed limit many runs found = go many (zip [seed ..] (programs seed))
+ where
+  go :: Int -> [(Int, Program)] -> IO ()
+  go 0 _ = pure ()
+  go _ [] = pure ()
+  go left ((n, p) : others) =
+    explored rule limit p >>= \case
+      Nothing -> go left others
+      Just (tried, outcomes) -> do
+        -- (A deadlock in reality is one that no simulated run has.)
+        outcomes' <- within 120 (inReality n runs p)
+        found (Compared p tried outcomes outcomes')
+        go (left - 1) others
+
+-- | How many schedules the program has, and all that comes of them. Nothing if there are more
+-- than the limit, or if under one of them it does not end.
+explored :: (IO String -> IO String) -> Int -> Program -> IO (Maybe (Int, Set String))
+explored rule limit p
+  | size p > 14 = pure Nothing
+  | otherwise = outcomesBy (Plan (Random 20 0) options) >>= maybe (pure Nothing) (const everything)
+ where
+  everything = outcomesBy (Plan (Exhaustive maxBound limit) options)
+  options = defaults {standstill = 2000}
+  outcomesBy plan = do
+    seen <- newIORef (Just Set.empty)
+    report <- explore plan $ \simulated' -> do
+      sofar <- readIORef seen
+      for_ sofar $ \outcomes -> do
+        run <- simulated' (rule (observed (pure ()) p))
+        writeIORef seen $ case outcome run of
+          Returned end -> Just (Set.insert end outcomes)
+          _ -> Nothing
+    outcomes <- readIORef seen
+    pure (if complete report then (,) (schedules report) <$> outcomes else Nothing)
+
+-- | What comes of the given number of real runs, whose timing varies from one to the next.
+inReality :: Int -> Int -> Program -> IO (Set String)
+inReality seed runs p = do
+  state <- newIORef seed
+  realOutcomes runs (observed (jitter state) p)
+
+-- | Half of the time nothing; else it lets others run, or takes a few microseconds.
+jitter :: IORef Int -> IO ()
+jitter state = do
+  n <- atomicModifyIORef' state (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', s' `div` 65536))
+  case n `mod` 8 of
+    0 -> yield
+    1 -> yield >> yield
+    2 -> yield >> yield >> yield
+    3 -> void (evaluate (spin (n `div` 8 `mod` 2000)))
+    _ -> pure ()
+ where
+  spin :: Int -> Int
+  spin 0 = 0
+  spin k = spin (k - 1)
+
+-- | How many programs there were, how many of them have several simulated outcomes; how many
+-- schedules and simulated outcomes there are in all, and how many of those came in reality.
+data Figures = Figures Int Int Int Int Int
+
+instance Semigroup Figures where
+  Figures a b c d e <> Figures a' b' c' d' e' = Figures (a + a') (b + b') (c + c') (d + d') (e + e')
+
+instance Monoid Figures where
+  mempty = Figures 0 0 0 0 0
+
+instance Show Figures where
+  show (Figures count several tried outcomes met) =
+    show count ++ " programs, " ++ show several ++ " of them with several outcomes; " ++ show tried ++ " schedules, "
+      ++ show outcomes ++ " outcomes, " ++ show met ++ " of them met in reality"
+
+figures :: Compared -> Figures
+figures c =
+  Figures 1 (if n > 1 then 1 else 0) (schedulesTried c) n (Set.size (Set.intersection (real c) (simulated c)))
+ where
+  n = Set.size (simulated c)
+
+-- | How many programs have several simulated outcomes, and how many there are.
+programsWithSeveral :: Figures -> (Int, Int)
+programsWithSeveral (Figures count several _ _ _) = (several, count)
