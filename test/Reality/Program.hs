@@ -14,7 +14,7 @@ import Control.Monad (replicateM, void)
 
 import Behavior (Behavior, (?))
 import Behavior.Internal.Runtime (atomically, checkpoint)
-import Behavior.Parallel (allOf, both, firstOf, fork, parallel, scoped)
+import Behavior.Parallel (allOf, await, both, firstOf, fork, parallel, scoped)
 import Behavior.Signal (Signal, watching)
 import qualified Behavior.Signal as Signal
 import Support (Failure (..), Fault (..), ending)
@@ -123,7 +123,7 @@ run jitter world = go
     Forking p q r -> scoped $ \nursery -> do
       result <- fork nursery (go p)
       void (go q)
-      c <- atomically result
+      c <- atomically (await result)
       c <$ go r
     RSelect g p q -> Signal.rSelect (condition g) (go p) (go q)
     Switch g p q -> Signal.switch (condition g) (\holds -> if holds then go p else go q)
