@@ -74,9 +74,9 @@ compareMany rule seed limit many runs found = go many (zip [seed ..] (programs s
 explored :: (IO String -> IO String) -> Int -> Program -> IO (Maybe (Int, Set String))
 explored rule limit p
   | size p > 14 = pure Nothing
-  | otherwise = outcomesBy (Plan (Random 20 0) options) >>= maybe (pure Nothing) (const everything)
+  | otherwise = outcomesBy (randomly 20) {under = options} >>= maybe (pure Nothing) (const everything)
  where
-  everything = outcomesBy (Plan (Exhaustive maxBound limit) options)
+  everything = outcomesBy (randomly 1) {search = Exhaustive maxBound limit, under = options}
   options = defaults {standstill = 2000}
   outcomesBy plan = do
     seen <- newIORef (Just Set.empty)
