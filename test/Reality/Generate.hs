@@ -111,7 +111,8 @@ lettered = snd . go ['a' ..]
     Monitor g p q -> two letters (Monitor g) p q
     WhileHolding g p -> WhileHolding g <$> go letters p
     other -> (letters, other)
-  letter letters make = (drop 1 letters, make (head letters))
+  letter (c : rest) make = (rest, make c)
+  letter [] make = ([], make '?')
   two letters make p q = (\(rest, p', q') -> (rest, make p' q')) (pair letters p q)
   pair letters p q =
     let (letters', p') = go letters p

@@ -121,7 +121,7 @@ delivery = do
   it "masked: at one that sleeps" $ reached mask_ (sleep 1) `shouldReturn` []
   it "masked uninterruptibly: never" $
     reached uninterruptibleMask_ (sleep 1) `shouldReturn` ["went on"]
-  it "never to the end of a thread" $ do
+  it "after the last operation: what it has done is done" $ do
     book <- newIORef []
     _ <- simulate (parallel (modifyIORef book ("went on" :)) (failed :: Behavior ())) 
     readIORef book `shouldReturn` ["went on"]

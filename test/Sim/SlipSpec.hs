@@ -3,7 +3,7 @@
 module Sim.SlipSpec (spec) where
 
 import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVarIO)
-import Control.Monad (forM_, when)
+import Control.Monad (forM_, unless)
 import Data.Foldable (traverse_)
 import Data.IORef
 import Data.List (nub, sort)
@@ -57,7 +57,7 @@ spec = guarded . describe "Slip" $ do
         parked <- newTVarIO False
         both
           (sleep 1 >> atomically (modifyTVar' parked (const True)))
-          (sleep 1.05 >> readTVarIO parked >>= \is -> when (not is) failed)
+          (sleep 1.05 >> readTVarIO parked >>= \is -> unless is failed)
       traverse_ fail [explain (outcome run) | Failing _ <- [outcome run]]
     either (const "found") show found `shouldBe` "found"
 
