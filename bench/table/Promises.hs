@@ -36,7 +36,7 @@ reacting =
     "Reacting: nanoseconds"
     [ "monitor, undisturbed" `within` 1.3 `times` "race, both end at once"
     , "rSelect, undisturbed" `within` 1.3 `times` "race, both end at once"
-    , "monitor, polled" `within` 2 `times` "race, both end at once"
+    , "monitor, polled" `within` 2.5 `times` "race, both end at once"
     , "interruption, recovery and restart" `within` 1.5 `times` scaled 2 "race, one to be stopped"
     ]
 manyBranches =

@@ -157,7 +157,7 @@ undefinedExceptions = do
       reading <- newGate
       book <- newNotebook
       let sensor = Signal.polling 0.001 ((open reading >> hang) `uninterruptibly` note book "cleaned up")
-      ending (Signal.withShared sensor (\_ -> pass reading >> bottom)) `shouldReturn` FaultedWith "undefined"
+      ending (Signal.withShared sensor (\_ -> pass reading >> bottom)) `shouldReturn` FaultedWith (show (Fault "undefined"))
       notes book `shouldReturn` ["cleaned up"]
     it ("monitor, " ++ kind ++ ": of the task while it stops, comes after the recovery") $ do
       condition <- newTVarIO False
@@ -167,17 +167,17 @@ undefinedExceptions = do
         pass entered
         atomically (writeTVar condition True)
         awaitEnd caller
-      end `shouldBe` (FaultedWith "undefined" :: Ending ())
+      end `shouldBe` (FaultedWith (show (Fault "undefined")) :: Ending ())
       notes book `shouldReturn` ["recovered"]
   it "that another undefined exception is made of: the same" $
-    beside (throwIO (throw (throw (ErrorCall "undefined") :: SomeException) :: SomeException)) parallel
+    beside (throwIO (throw (throw (Fault "undefined") :: SomeException) :: SomeException)) parallel
  where
   exceptions =
-    [ ("SomeException", throwIO (throw (ErrorCall "undefined") :: SomeException))
-    , ("BehaviorFailed", throwIO (throw (ErrorCall "undefined") :: BehaviorFailed))
-    , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed (throw (ErrorCall "undefined") :: Failed)))
-    , ("SomeAsyncException", throwIO (throw (ErrorCall "undefined") :: SomeAsyncException))
-    , ("of a type of its own", throwIO (throw (ErrorCall "undefined") :: Fault))
+    [ ("SomeException", throwIO (throw (Fault "undefined") :: SomeException))
+    , ("BehaviorFailed", throwIO (throw (Fault "undefined") :: BehaviorFailed))
+    , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed (throw (Fault "undefined") :: Failed)))
+    , ("SomeAsyncException", throwIO (throw (Fault "undefined") :: SomeAsyncException))
+    , ("of a type of its own", throwIO (throw (Fault "undefined") :: Fault))
     ]
   several =
     [ ("parallel", parallel)
@@ -198,5 +198,5 @@ undefinedExceptions = do
       stillRunning caller
       open mayEnd
       awaitEnd caller
-    end `shouldBe` FaultedWith "undefined"
+    end `shouldBe` FaultedWith (show (Fault "undefined"))
     notes book `shouldReturn` ["cleaned up"]

@@ -28,7 +28,7 @@ spec = guarded $ do
 -- | Each operator, with a first branch that goes on, and what makes it stop that.
 operators :: [(String, Behavior () -> Behavior () -> Behavior ())]
 operators =
-  [ ("parallel", \act enough -> parallel enough act)
+  [ ("parallel", flip parallel)
   , ("parallel, left", parallel)
   , ("both", \act enough -> both act (enough >> failed))
   , ("firstOf", \act enough -> firstOf [enough, act, hang])
@@ -37,7 +37,7 @@ operators =
   , ("whileHolding", \act enough -> condition enough (`Signal.whileHolding` act))
   , ("monitor", \act enough -> condition enough (\c -> Signal.monitor (not <$> c) (pure ()) act))
   , ("monitor in parallel", \act enough -> monitor (pure False) (pure ()) act ||| enough)
-  , ("withShared in timeout", \act enough -> timeout 3600 (Signal.withShared (pure ()) (\_ -> act) ||| enough))
+  , ("withShared in timeout", \act enough -> timeout 3600 (Signal.withShared (pure ()) (const act) ||| enough))
   ]
  where
   -- A signal that is true until then.
@@ -55,11 +55,11 @@ throwing' = do
         received 2 (operator `stopping` (\me -> masked (eStop me >> throwTo me (Cancel "again")))) False
           `shouldReturn` [FaultedWith (show (Fault "e-stop")), CancelledBy (show (Cancel "again"))]
       it (name ++ ", " ++ manner ++ ", when the caller was cancelled: likewise") $
-        received 2 (\entered -> stopping (\act _ -> operator act hang) (masked . eStop) entered) True
+        received 2 (stopping (\act _ -> operator act hang) (masked . eStop)) True
           `shouldReturn` [CancelledBy (show (Cancel "the caller")), FaultedWith (show (Fault "e-stop"))]
 
   it "a masked caller has the result first" $
-    received 2 (\entered -> mask_ (stopping (\act enough -> void (firstOf [enough, act])) (uninterruptibleMask_ . eStop) entered)) False
+    received 2 (mask_ . stopping (\act enough -> void (firstOf [enough, act])) (uninterruptibleMask_ . eStop)) False
       `shouldReturn` [Gave (), FaultedWith (show (Fault "e-stop"))]
 
   it "storms of them, in nested operators: all end, and nothing is orphaned" $
