@@ -6,13 +6,13 @@
 -- To wait for threads, uninterruptibly, but not for one that waits for the caller: a cleanup
 -- that throws to the caller (@throwTo@ returns when its target has received the exception).
 --
--- Whom a thread throws to cannot be asked. So when a thread that is waited for is blocked in
--- a @throwTo@, or waits here for one that is, the caller can be interrupted until it has
--- received one exception. Everything else that is thrown to it stays pending, as with any
--- thread that cannot be interrupted: two time limits that expire meanwhile are kept in GHC's
--- own queue, where the outer one takes the inner one back.
+-- GHC does not say which thread a @throwTo@ is for. So when a thread that is waited for is
+-- blocked in a @throwTo@, or waits here for one that is, the caller can be interrupted until
+-- it has received one exception. Everything else that is thrown to it stays pending, as with
+-- any thread that cannot be interrupted: two time limits that expire meanwhile are in GHC's
+-- own queue, from which the outer one withdraws the inner one.
 --
--- A thread of its own looks every 10 ms, for as long as there is somebody who waits.
+-- A thread of its own looks every 10 ms, for as long as a thread waits here.
 module Behavior.Internal.Deadlock
   ( awaitUnlessAwaited
   , isDeadlock
@@ -44,8 +44,8 @@ data Waiter = Waiter
 
 -- | All that wait; the number of the next; and whether there is a thread that looks.
 --
--- They are held weakly: or GHC would take none of them for deadlocked, and would not wake a
--- cleanup that waits for what never comes.
+-- The references are weak: otherwise GHC would find none of them deadlocked, and would not
+-- throw to a cleanup that waits for what never comes.
 data Waiters = Waiters !(IntMap (Weak Waiter)) !Int !Bool
 
 waiters :: IORef Waiters
@@ -83,8 +83,8 @@ isDeadlock e = either undefinedOne id <$> try (evaluate isOne)
   undefinedOne :: SomeException -> Bool
   undefinedOne _ = False
 
--- | GHC's deadlock detector is not heeded: it takes a thread that waits for a cleanup which
--- itself was just woken by the detector for deadlocked too.
+-- | Goes on when GHC takes the thread for deadlocked: it does so, too, while the cleanup that
+-- the thread waits for handles the same exception.
 uninterruptibly :: STM a -> IO a
 uninterruptibly transaction = uninterruptibleMask_ again
  where

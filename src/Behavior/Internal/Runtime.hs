@@ -227,9 +227,8 @@ unlessAtAGlance glance waiting = inSimulation twice (const (pure Nothing)) >>= m
  where
   twice = glance >>= maybe (yield >> glance) (pure . Just)
 
--- | A wait that nothing can interrupt. GHC's deadlock detector is not heeded: it takes a
--- thread that waits for a cleanup which itself was just woken by the detector for deadlocked
--- too.
+-- | A wait that nothing can interrupt. It goes on when GHC takes the thread for deadlocked: GHC
+-- does so, too, while the cleanup that the thread waits for handles the same exception.
 firmly :: IO a -> IO a
 firmly waiting = uninterruptibleMask_ again
  where

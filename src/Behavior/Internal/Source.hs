@@ -136,6 +136,7 @@ instance Applicative View where
 -- | Whether the operator has had a value before.
 data Look = FirstRead | Reread
 
+-- | The value, looked at in that way.
 lookAt :: Look -> View a -> STM a
 lookAt FirstRead = firstRead
 lookAt Reread = reread
