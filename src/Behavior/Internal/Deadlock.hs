@@ -24,10 +24,9 @@ import qualified Control.Concurrent.STM as STM
 import Control.Exception
 import Control.Monad (unless, void, when)
 import Data.Foldable (for_)
-import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
+import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
-import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (catMaybes)
 import GHC.Base (IO (..), mkWeakNoFinalizer#)
@@ -39,6 +38,8 @@ import System.IO.Unsafe (unsafePerformIO)
 data Waiter = Waiter
   { waiting :: !ThreadId
   , awaited :: [ThreadId]
+  , throwing :: !(IORef [Bool])
+  -- ^ Which of those that it waits for were blocked in a @throwTo@ at the last look.
   , interruptible' :: !(TVar Bool)
   }
 
@@ -58,7 +59,7 @@ awaitUnlessAwaited :: [ThreadId] -> STM a -> IO ([SomeException], a)
 awaitUnlessAwaited threads transaction = do
   self <- myThreadId
   window <- STM.newTVarIO False
-  n <- register (Waiter self threads window)
+  n <- newIORef [] >>= \none -> register (Waiter self threads none window)
   let await received =
         uninterruptibly ((Just <$> transaction) `STM.orElse` (Nothing <$ (STM.readTVar window >>= STM.check))) >>= \case
           Just a -> pure (received, a)
@@ -98,7 +99,7 @@ register waiter = do
   unless looks . void . mask_ . forkIO $ do
     self <- myThreadId
     labelThread self "deadlock: looks"
-    look Map.empty
+    look
   pure n
 
 unregister :: Int -> IO ()
@@ -111,19 +112,24 @@ weakly waiter@Waiter {interruptible' = TVar variable} =
 
 -- | Looks for as long as a thread waits. One counts as blocked in a @throwTo@ when it was so
 -- in two looks in a row: most are for an instant only.
-look :: Map ThreadId Bool -> IO ()
-look before = do
+--
+-- (From one look to the next this holds on to no thread.)
+look :: IO ()
+look = do
   threadDelay 10000
   goesOn <- atomicModifyIORef' waiters $ \(Waiters all' next _) ->
     let some = not (IntMap.null all') in (Waiters all' next some, some)
   when goesOn $ do
     Waiters all' _ _ <- readIORef waiters
     alive <- catMaybes <$> traverse deRefWeak (IntMap.elems all')
-    throwing <- traverse isThrowing (Map.fromList [(thread, thread) | w <- alive, thread <- awaited w])
-    let stuck = Map.filter id (Map.intersectionWith (&&) before throwing)
-        waitsFor = Map.fromListWith (++) [(waiting w, awaited w) | w <- alive]
-        isStuck thread = Map.member thread stuck || any isStuck (Map.findWithDefault [] thread waitsFor)
-    for_ alive $ \w -> STM.atomically (STM.writeTVar (interruptible' w) (any isStuck (awaited w)))
-    look throwing
- where
-  isThrowing thread = (== ThreadBlocked BlockedOnException) <$> threadStatus thread
+    blocked <- Map.fromList <$> traverse (\w -> (,) (waiting w) . (,) (awaited w) <$> awaitsThrower w) alive
+    let isStuck thread = maybe False (\(others, one) -> one || any isStuck others) (Map.lookup thread blocked)
+    for_ alive $ \w -> STM.atomically (STM.writeTVar (interruptible' w) (isStuck (waiting w)))
+    look
+
+-- | Whether one of those that it waits for is blocked in a @throwTo@, and was before.
+awaitsThrower :: Waiter -> IO Bool
+awaitsThrower w = do
+  before <- readIORef (throwing w)
+  current <- traverse (fmap (== ThreadBlocked BlockedOnException) . threadStatus) (awaited w)
+  or (zipWith (&&) before current) <$ (writeIORef (throwing w) $! foldr seq current current)
