@@ -76,11 +76,17 @@
 --
 -- == What GHC limits
 --
--- An operator waits for the cleanups of its branches, but not for one that waits for the operator's
--- caller: a cleanup may throw to it. (Not where the caller runs under
--- 'Control.Exception.uninterruptibleMask_': there it hangs, as in GHC.) Time limits from outside
--- ('System.Timeout.timeout') that expire meanwhile stay pending, as with any thread that cannot be
--- interrupted.
+-- An operator waits for the cleanups of its branches, and what is thrown at its caller meanwhile is
+-- first received, then pending, as in a thread that cannot be interrupted. So a cleanup may throw to
+-- the operator's caller itself, once:
+--
+-- > parallel drive (steer `finally` throwTo me EmergencyStop)
+--
+-- A second exception, or one for a caller that is masked or has been stopped already (as the caller
+-- of a nested operator has, whose outer one was stopped), hangs: @throwTo@ waits for the caller, and
+-- that for the cleanup. Have a thread of its own throw it:
+--
+-- > parallel drive (steer `finally` forkIO (throwTo me EmergencyStop))
 --
 -- A behaviour that never reaches a point where it could be interrupted is not: a loop that
 -- never allocates (compile it with @-fno-omit-yields@), a safe foreign call (import it

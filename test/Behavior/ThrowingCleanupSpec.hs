@@ -2,14 +2,16 @@
 
 -- |
 -- An operator does not wait for what waits for it: a cleanup that throws to the operator's
--- caller. And it keeps apart what others throw to its caller meanwhile: limits of time.
+-- caller, once. (A second exception, or one for a caller that was stopped already or is
+-- masked, is pending until the operator ends: a cleanup has a thread of its own throw it.)
+-- And two limits of time that expire meanwhile do what they do in GHC.
 module Behavior.ThrowingCleanupSpec (spec) where
 
 import Control.Concurrent (ThreadId, forkIO, killThread, myThreadId)
-import Control.Concurrent.Async (asyncThreadId, wait)
+import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, writeTVar)
 import Control.Exception
-import Control.Monad (replicateM, replicateM_, void, when)
+import Control.Monad (replicateM_, void)
 import Data.Foldable (for_)
 import Test.Hspec hiding (parallel)
 
@@ -22,7 +24,7 @@ import Support hiding (End (..))
 
 spec :: Spec
 spec = guarded $ do
-  describe "A cleanup that throws to the operator's caller" throwing'
+  describe "A cleanup that throws to the operator's caller" fromCleanups
   describe "Two limits that expire while an operator waits for a cleanup" limits
 
 -- | Each operator, with a first branch that goes on, and what makes it stop that.
@@ -45,37 +47,37 @@ operators =
     over <- newTVarIO False
     body (not <$> Signal.watching (readTVar over)) ||| (enough >> atomically (writeTVar over True) >> hang)
 
-throwing' :: Spec
-throwing' = do
+fromCleanups :: Spec
+fromCleanups = do
   for_ operators $ \(name, operator) ->
     for_ masks $ \(manner, masked) -> do
       it (name ++ ", " ++ manner ++ ": the operator ends, and what was thrown gets out") $
-        received 1 (operator `stopping` (masked . eStop)) False `shouldReturn` [FaultedWith (show (Fault "e-stop"))]
-      it (name ++ ", " ++ manner ++ ", twice: likewise, the one and then the other") $
-        received 2 (operator `stopping` (\me -> masked (eStop me >> throwTo me (Cancel "again")))) False
-          `shouldReturn` [FaultedWith (show (Fault "e-stop")), CancelledBy (show (Cancel "again"))]
-      it (name ++ ", " ++ manner ++ ", when the caller was cancelled: likewise") $
-        received 2 (stopping (\act _ -> operator act hang) (masked . eStop)) True
-          `shouldReturn` [CancelledBy (show (Cancel "the caller")), FaultedWith (show (Fault "e-stop"))]
+        stopping operator (masked . eStop) `shouldReturn` FaultedWith (show (Fault "e-stop"))
+      it (name ++ ", " ++ manner ++ ", by a thread of its own: likewise, and the second after it") $
+        stopping operator (\me -> masked (eStop me >> void (forkIO (throwTo me (Cancel "again")))))
+          `shouldReturn` FaultedWith (show (Fault "e-stop"))
+      it (name ++ ", " ++ manner ++ ", by a thread of its own, when the caller was cancelled: ends by that") $ do
+        entered <- newGate
+        end <- launching (do me <- myThreadId; operator (branch entered (masked (void (forkIO (eStop me))))) hang) $ \caller -> do
+          pass entered
+          throwing (asyncThreadId caller) (Cancel "the caller")
+          awaitEnd caller
+        end `shouldBe` CancelledBy (show (Cancel "the caller"))
 
-  it "a masked caller has the result first" $
-    received 2 (mask_ . stopping (\act enough -> void (firstOf [enough, act])) (uninterruptibleMask_ . eStop)) False
-      `shouldReturn` [Gave (), FaultedWith (show (Fault "e-stop"))]
-
-  it "storms of them, in nested operators: all end, and nothing is orphaned" $
+  it "storms of them, by threads of their own, in nested operators: all end, and nothing is orphaned" $
     replicateM_ 20 $ do
       gates <- mapM (const newGate) [1 .. 4 :: Int]
       room <- newTVarIO (0 :: Int)
       end <- launching (do
         me <- myThreadId
-        let stormy n = do
-              self <- myThreadId
-              counted room (branch (gates !! n) (throwTo me (Fault (show n)) `finally` throwTo self (Fault "self")))
+        let throwing' target e = void (forkIO (throwTo target (Fault e)))
+            stormy n cleanup = counted room (branch (gates !! n) cleanup)
             nested n m = do
               self <- myThreadId
-              parallel (stormy n) (stormy m `finally` throwTo self (Fault "its operator"))
+              parallel (stormy n (throwing' self "inner")) (stormy m (throwing' me "outer"))
         parallel (for_ gates pass) (both (nested 0 1) (nested 2 3))) awaitEnd
       end `shouldSatisfy` \case
+        Gave () -> True
         FaultedWith _ -> True
         CancelledWithFault _ _ -> True
         _ -> False
@@ -87,16 +89,9 @@ throwing' = do
     ] :: [(String, IO () -> IO ())]
   eStop me = throwTo me (Fault "e-stop")
   branch entered cleanup = (open entered >> hang) `onException` cleanup
-  stopping operator cleanup entered = do
-    me <- myThreadId
-    operator (branch entered (cleanup me)) (pass entered)
-  -- What a thread receives that runs this, and then waits.
-  received n act cancel = do
+  stopping operator cleanup = do
     entered <- newGate
-    launching (mask $ \restore -> (:) <$> ending (restore (act entered)) <*> replicateM (n - 1) (ending hang)) $ \caller -> do
-      pass entered
-      when cancel (throwing (asyncThreadId caller) (Cancel "the caller"))
-      wait caller
+    launching (myThreadId >>= \me -> operator (branch entered (cleanup me)) (pass entered)) awaitEnd
   counted room act =
     mask $ \restore -> do
       atomically (readTVar room >>= writeTVar room . (+ 1))

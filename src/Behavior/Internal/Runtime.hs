@@ -5,8 +5,8 @@
 -- |
 -- The seam: all that the library does with threads, time and waiting goes through
 -- this module. No other module (but the clock that it sleeps by,
--- "Behavior.Internal.Alarm", and "Behavior.Internal.Deadlock") forks, delays, throws to a
--- thread or waits in a transaction, so a simulation that takes over here has taken over everything.
+-- "Behavior.Internal.Alarm") forks, delays, throws to a thread or waits in a
+-- transaction, so a simulation that takes over here has taken over everything.
 --
 -- Each operation is done in reality, or in the simulation that the calling thread
 -- is part of ("Behavior.Internal.Seam").
@@ -26,7 +26,6 @@ module Behavior.Internal.Runtime
     -- * Waiting
   , atomically
   , firmly
-  , awaitUninterruptibly
   , unlessAtAGlance
   , checkpoint
   , giveWay
@@ -72,7 +71,6 @@ import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 
 import qualified Behavior.Internal.Alarm as Alarm
 import Behavior.Internal.Counter
-import qualified Behavior.Internal.Deadlock as Deadlock
 import Behavior.Internal.Seam
 import Behavior.Internal.Seconds
 import Behavior.Internal.Simulator
@@ -233,16 +231,6 @@ firmly :: IO a -> IO a
 firmly waiting = uninterruptibleMask_ again
  where
   again = try waiting >>= either (\BlockedIndefinitelyOnSTM -> again) pure
-
--- | Waits, uninterruptibly, for a transaction that comes when these threads have ended; but
--- not for a thread that waits until the caller has received an exception. What the caller has
--- received so is given too, the latest first. Call it masked.
---
--- (In a simulation no thread waits so: what is thrown goes by the seam, or is reported.)
-awaitUninterruptibly :: [ThreadId] -> STM a -> IO ([SomeException], a)
-awaitUninterruptibly threads' transaction =
-  inSimulation (Deadlock.awaitUnlessAwaited threads' transaction) $ \simulation ->
-    (,) [] <$> firmly (transact simulation transaction)
 
 -- | A moment at which the others may run, and a cancellation that is under way
 -- arrives, if the masking state allows it.

@@ -45,7 +45,9 @@ module Behavior.Internal.Scope
 import Control.Concurrent (ThreadId, myThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception
-  ( Exception (..)
+  ( BlockedIndefinitelyOnMVar (..)
+  , BlockedIndefinitelyOnSTM (..)
+  , Exception (..)
   , MaskingState (..)
   , SomeAsyncException (..)
   , SomeException (..)
@@ -61,12 +63,9 @@ import Control.Exception
   , try
   )
 import Control.Monad (foldM, when)
-import Data.Either (isLeft)
-import Data.Foldable (for_)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
-import Behavior.Internal.Deadlock (isDeadlock)
 import Behavior.Internal.Failure (BehaviorFailed (..), isFailure)
 import Behavior.Internal.Runtime
 
@@ -117,58 +116,59 @@ structured body = do
     scope <- Scope <$> newIORef []
     -- (As @body scope@ it would be a thunk first, in every operator.)
     verdict <- try (restore (pure scope >>= body))
-    (thrown, faults) <- end scope state (either pure (const []) verdict)
-    deadlocked <- either isDeadlock (const (pure False)) verdict
-    case (if deadlocked then drop 1 thrown else thrown, faults) of
-      (first : others, _) | state == Unmasked || isLeft verdict -> do
-        throwLater others
-        throwIO (case faults of [] -> first; fault : _ -> toException (StoppedWithFault first fault))
-      (others, _) -> do
-        throwLater others
-        -- What was thrown at the caller while it could not be interrupted arrives here, and
-        -- not when the outcome has been thrown into some handler of the caller's.
-        case faults of
-          [] -> restore checkpoint >> either throwIO id verdict
-          fault : _ -> do
-            restore checkpoint `catch` \e -> throwIO (StoppedWithFault e fault)
-            throwIO fault
+    (thrown, faults) <- end scope state (either Just (const Nothing) verdict)
+    deadlocked <- maybe (pure False) isDeadlock thrown
+    case (thrown, faults) of
+      (Just e, []) | not deadlocked -> throwIO e
+      (Just e, fault : _) | not deadlocked -> withFault e fault
+      -- What was thrown at the caller while it could not be interrupted arrives here, and
+      -- not when the outcome has been thrown into some handler of the caller's.
+      (_, []) -> restore checkpoint >> either throwIO id verdict
+      (_, fault : _) -> do
+        restore checkpoint `catch` \e -> withFault e fault
+        throwIO fault
  where
-  throwLater [] = pure ()
-  throwLater others = myThreadId >>= \self -> for_ others (\e -> interruptByMessengers (const e) [self])
+  withFault e fault = defined e >>= \e' -> throwIO (StoppedWithFault e' fault)
 
--- | Stops everything in the scope. Gives the faults from left to right, and what has been
--- thrown at the caller, the first first: what had been before, or while this waits.
+-- | Whether GHC threw it because the thread waits for what will never come. It throws that to
+-- a branch and to the operator that waits for it alike, so a fault of the branch comes first.
+isDeadlock :: SomeException -> IO Bool
+isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromException e) of
+  (Just BlockedIndefinitelyOnSTM, _) -> True
+  (_, Just BlockedIndefinitelyOnMVar) -> True
+  _ -> False
+
+-- | Stops everything in the scope. Gives what has been thrown at the caller (before, or while
+-- this waits), and the faults from left to right.
 --
--- A caller that is not masked can be interrupted here as long as nothing was thrown at it (so
--- a cleanup may throw to it). After that it cannot, or branches would be orphaned; what is
--- thrown stays pending, in GHC's own queue, where it can be taken back. Neither can a caller
--- that is masked: it must not lose the verdict.
-end :: Scope -> MaskingState -> [SomeException] -> IO ([SomeException], [SomeException])
+-- A caller that is not masked can be interrupted here until something was thrown at it: so a
+-- cleanup may throw to it. After that it cannot, or branches would be orphaned; what is
+-- thrown then stays pending, in GHC's own queue, from which it can be withdrawn. (To receive
+-- it here and throw it again later would let a time limit reach what comes after its end.)
+-- Neither can a caller that is masked: it must not lose the verdict.
+end :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
 end (Scope branches) state before = do
   newestFirst <- readIORef branches
-  (more, ()) <- once before (ask newestFirst) ((,) [] <$> askWithoutWaiting newestFirst)
-  (thrown, faults) <- foldM (withFault (map idOf newestFirst)) (more ++ before, []) (reverse newestFirst)
-  pure (reverse thrown, reverse faults)
+  (thrown, ()) <- once before (ask newestFirst) (askWithoutWaiting newestFirst)
+  fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
  where
-  idOf (SomeBranch b) = branchId b
-  withFault threads' (thrown, faults) (SomeBranch b) = do
-    (more, o) <-
-      unlessAtAGlance (fmap ((,) []) <$> outcomeNow b) $
-        once thrown (atomically (outcome b)) (awaitUninterruptibly threads' (outcome b))
-    let thrown' = more ++ thrown
+  withFault (thrown, faults) (SomeBranch b) = do
+    (thrown', o) <-
+      unlessAtAGlance (fmap ((,) thrown) <$> outcomeNow b) $
+        once thrown (atomically (outcome b)) (firmly (atomically (outcome b)))
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)
   -- The first can be interrupted; then the second is done.
-  once thrown interruptibly uninterruptibly
-    | state == Unmasked, null thrown =
-        try interruptibly >>= \case
-          Right a -> pure ([], a)
-          Left e -> do
-            deadlocked <- isDeadlock e
-            (more, a) <- uninterruptibly
-            pure (if deadlocked then more else more ++ [e], a)
-    | otherwise = uninterruptibly
+  once thrown interruptibly uninterruptibly = case thrown of
+    Nothing | state == Unmasked -> do
+      tried <- try interruptibly
+      case tried of
+        Right a -> pure (Nothing, a)
+        Left e -> do
+          deadlocked <- isDeadlock e
+          (,) (if deadlocked then Nothing else Just e) <$> uninterruptibly
+    _ -> (,) thrown <$> uninterruptibly
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
@@ -282,7 +282,10 @@ classified = \case
     | isFailure e = Failing e
     | otherwise = Faulted e
   isStopOf self cause = fromException cause == Just (Stop self)
-  defined e = try (evaluate (forced e)) >>= either defined pure
+
+-- | The exception; or if it is itself undefined, what it throws.
+defined :: SomeException -> IO SomeException
+defined e = try (evaluate (forced e)) >>= either defined pure
 
 -- | The exception; all that handlers match on is evaluated with it.
 forced :: SomeException -> SomeException
