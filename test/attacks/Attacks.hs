@@ -1,0 +1,38 @@
+-- | Runs one attack by its name; without a name it says which there are.
+module Main (main) where
+
+import System.Environment (getArgs)
+import System.Exit (die)
+
+import qualified DeadCleanup
+import qualified IndirectThrow
+import qualified NestedLimits
+import qualified NurseryRaces
+import qualified ReactiveThrow
+import qualified SlowStops
+import qualified Storm
+import qualified StuckLimits
+import qualified UndefinedOutside
+import qualified UninterruptibleCaller
+
+main :: IO ()
+main = do
+  arguments <- getArgs
+  case arguments of
+    [] -> mapM_ (putStrLn . fst) attacks
+    [name] | Just attack <- lookup name attacks -> attack
+    _ -> die "attacks: the argument is the name of one"
+
+attacks :: [(String, IO ())]
+attacks =
+  [ ("DeadCleanup", DeadCleanup.attack)
+  , ("IndirectThrow", IndirectThrow.attack)
+  , ("NestedLimits", NestedLimits.attack)
+  , ("NurseryRaces", NurseryRaces.attack)
+  , ("ReactiveThrow", ReactiveThrow.attack)
+  , ("SlowStops", SlowStops.attack)
+  , ("Storm", Storm.attack)
+  , ("StuckLimits", StuckLimits.attack)
+  , ("UndefinedOutside", UndefinedOutside.attack)
+  , ("UninterruptibleCaller", UninterruptibleCaller.attack)
+  ]

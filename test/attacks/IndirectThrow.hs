@@ -1,0 +1,43 @@
+-- | Attacks: a cleanup that throws to the operator's caller, but from a branch or a thread of its
+-- own that it waits for. Must come out: the operator ends (DESIGN: it waits for none that waits for it).
+module IndirectThrow (attack) where
+
+import Control.Concurrent
+import Control.Exception
+import Control.Monad (forM_, void)
+import qualified Control.Concurrent.Async as Async
+import System.IO (hFlush, stdout)
+
+import Attack
+import Behavior
+import Behavior.Parallel (allOf, scoped, fork)
+import Behavior.STM (atomically)
+import qualified Behavior.Parallel as P
+
+attack :: IO ()
+attack =
+  forM_ ways $ \(name, indirectly) ->
+    forM_ callers $ \(caller, around) -> do
+      putStrLn (name ++ ", " ++ caller) >> hFlush stdout
+      entered <- newEmptyMVar
+      end <- endsWithin 3000 (name ++ ", " ++ caller) (\t -> takeMVar entered >> milliseconds 20 >> void (forkIO (throwTo t (Boom 0)))) $ do
+        me <- myThreadId
+        _ <- around (parallel ((putMVar entered () >> milliseconds 3600000) `finally` indirectly (throwTo me (Boom 1))) (milliseconds 100))
+        milliseconds 500
+      end `seq` pure ()
+
+ways :: [(String, IO () -> IO ())]
+ways =
+  [ ("directly", id)
+  , ("in both", \act -> both act (pure ()))
+  , ("in allOf", \act -> void (allOf [act, pure ()]))
+  , ("in monitor", \act -> monitor (pure False) (pure ()) act)
+  , ("in a child that is awaited", \act -> scoped (\n -> fork n act >>= \c -> atomically (P.await c)))
+  , ("in async's concurrently", \act -> Async.concurrently_ act (pure ()))
+  ]
+
+callers :: [(String, IO () -> IO ())]
+callers =
+  [ ("a caller that has been thrown something", id)
+  , ("a masked caller", mask_)
+  ]
