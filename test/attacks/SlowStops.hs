@@ -13,12 +13,11 @@ import Behavior
 
 attack :: IO ()
 attack = do
-  waiting "20,000 side by side" $ \gate -> do
-    ends <- replicateM 20000 $ do
-      done <- newEmptyMVar
-      _ <- forkIO (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())) `finally` putMVar done ())
-      pure done
-    pure (mapM_ takeMVar ends)
+  sideBySide "20,000 side by side, waited for without the library" (\gate -> do
+    box <- newEmptyMVar
+    _ <- forkIO (uninterruptibleMask_ (readMVar gate) `finally` putMVar box ())
+    uninterruptibleMask_ (takeMVar box))
+  sideBySide "20,000 side by side" (\gate -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())))
   waiting "1,500 one inside the other" $ \gate -> do
     let nest :: Int -> IO ()
         nest 0 = milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)
@@ -32,6 +31,12 @@ attack = do
   -- And many after one another.
   forM_ [1 .. 3000 :: Int] $ \_ -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (threadDelay 100)) (pure ()))
  where
+  sideBySide what one = waiting what $ \gate -> do
+    ends <- replicateM 20000 $ do
+      done <- newEmptyMVar
+      _ <- forkIO (one gate `finally` putMVar done ())
+      pure done
+    pure (mapM_ takeMVar ends)
   waiting what begin = do
     gate <- newEmptyMVar
     finish <- begin gate
