@@ -12,6 +12,7 @@ import qualified ReactiveThrow
 import qualified SimEnds
 import qualified SharedFilters
 import qualified SimGhc
+import qualified StuckMasked
 import qualified SlowStops
 import qualified Storm
 import qualified StuckLimits
@@ -36,6 +37,7 @@ attacks =
   , ("SimEnds", SimEnds.attack)
   , ("SharedFilters", SharedFilters.attack)
   , ("SimGhc", SimGhc.attack)
+  , ("StuckMasked", StuckMasked.attack)
   , ("SlowStops", SlowStops.attack)
   , ("Storm", Storm.attack)
   , ("StuckLimits", StuckLimits.attack)

@@ -5,8 +5,8 @@ module IndirectThrow (attack) where
 import Control.Concurrent
 import Control.Exception
 import Control.Monad (forM_, void)
+import Data.List (intercalate)
 import qualified Control.Concurrent.Async as Async
-import System.IO (hFlush, stdout)
 
 import Attack
 import Behavior
@@ -15,16 +15,27 @@ import Behavior.STM (atomically)
 import qualified Behavior.Parallel as P
 
 attack :: IO ()
-attack =
+attack = do
+  hung <- newMVar []
   forM_ ways $ \(name, indirectly) ->
     forM_ callers $ \(caller, around) -> do
-      putStrLn (name ++ ", " ++ caller) >> hFlush stdout
       entered <- newEmptyMVar
-      end <- endsWithin 3000 (name ++ ", " ++ caller) (\t -> takeMVar entered >> milliseconds 20 >> void (forkIO (throwTo t (Boom 0)))) $ do
+      over <- newEmptyMVar
+      t <- mask_ $ forkIOWithUnmask $ \unmask -> void . flip finally (putMVar over ()) $ do
         me <- myThreadId
-        _ <- around (parallel ((putMVar entered () >> milliseconds 3600000) `finally` indirectly (throwTo me (Boom 1))) (milliseconds 100))
-        milliseconds 500
-      end `seq` pure ()
+        try (unmask $ do
+          _ <- around (parallel ((putMVar entered () >> milliseconds 3600000) `finally` indirectly (throwTo me (Boom 1))) (milliseconds 100))
+          milliseconds 300) :: IO (Either SomeException ())
+      takeMVar entered
+      milliseconds 20
+      _ <- forkIO (throwTo t (Boom 0))
+      milliseconds 1500
+      ended <- tryTakeMVar over
+      case ended of
+        Just () -> pure ()
+        Nothing -> modifyMVar_ hung (pure . ((name ++ ", " ++ caller) :))
+  those <- takeMVar hung
+  promise ("these hang: " ++ intercalate "; " (reverse those)) (null those)
 
 ways :: [(String, IO () -> IO ())]
 ways =
