@@ -4,21 +4,28 @@ module SlowStops (attack) where
 
 import Control.Concurrent
 import Control.Exception
-import Control.Monad (forM_, replicateM, void)
+import Control.Monad (replicateM, replicateM_, void)
+import Data.List (intercalate)
 import System.CPUTime (getCPUTime)
 import GHC.Clock (getMonotonicTime)
+import GHC.Stats
+import System.Mem (performMajorGC)
 
 import Attack
 import Behavior
 
 attack :: IO ()
 attack = do
-  sideBySide "20,000 side by side, waited for without the library" (\gate -> do
+  alone <- sideBySide "20,000 side by side, waited for without the library" (\gate -> do
     box <- newEmptyMVar
     _ <- forkIO (uninterruptibleMask_ (readMVar gate) `finally` putMVar box ())
     uninterruptibleMask_ (takeMVar box))
-  sideBySide "20,000 side by side" (\gate -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())))
-  waiting "1,500 one inside the other" $ \gate -> do
+  beside <- sideBySide "20,000 side by side" (\gate -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())))
+  one <- waiting "one alone" $ \gate -> do
+    done <- newEmptyMVar
+    _ <- forkIO (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())) `finally` putMVar done ())
+    pure (takeMVar done)
+  nested <- waiting "1,500 one inside the other" $ \gate -> do
     let nest :: Int -> IO ()
         nest 0 = milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)
         nest n = both (nest (n - 1)) (milliseconds 3600000)
@@ -29,7 +36,15 @@ attack = do
     milliseconds 1000
     pure (takeMVar done)
   -- And many after one another.
-  forM_ [1 .. 3000 :: Int] $ \_ -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (threadDelay 100)) (pure ()))
+  let slowStop = mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (threadDelay 50)) (pure ()))
+  replicateM_ 2000 slowStop
+  before <- resident
+  replicateM_ 20000 slowStop
+  after <- resident
+  promise ("memory " ++ show (before, after)) (after < before + 1000000)
+  putStrLn ("memory before and after 20,000 slow stops " ++ show (before, after))
+  let spinning = alone ++ one ++ beside ++ nested
+  promise (intercalate "; " spinning) (null spinning)
  where
   sideBySide what one = waiting what $ \gate -> do
     ends <- replicateM 20000 $ do
@@ -50,4 +65,5 @@ attack = do
     _ <- inThread 20000 what finish
     n <- living
     promise (what ++ ": " ++ show n ++ " threads were left") (n == 0)
-    promise (what ++ ": they used " ++ show share ++ " of a processor while they waited") (share < 0.1)
+    pure [what ++ ": they used " ++ show share ++ " of a processor while they waited" | share >= 0.1]
+  resident = performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats
