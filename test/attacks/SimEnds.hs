@@ -2,7 +2,6 @@
 -- random moments. Must come out: same seed, same run; no thread, no memory, no hang is left.
 module SimEnds (attack) where
 
-import Control.Concurrent
 import Control.Exception
 import Control.Monad (forM_, void, when)
 import GHC.Stats

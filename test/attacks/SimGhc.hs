@@ -4,7 +4,7 @@ module SimGhc (attack) where
 
 import Control.Concurrent.STM (check, newTVarIO, readTVar, readTVarIO, writeTVar)
 import Control.Exception
-import Control.Monad (forM, forM_, void)
+import Control.Monad (forM, forM_)
 import Data.List (nub, sort)
 
 import Attack

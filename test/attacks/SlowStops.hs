@@ -39,10 +39,10 @@ attack = do
   let slowStop = mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (threadDelay 50)) (pure ()))
   replicateM_ 2000 slowStop
   before <- resident
-  replicateM_ 20000 slowStop
+  replicateM_ 5000 slowStop
   after <- resident
   promise ("memory " ++ show (before, after)) (after < before + 1000000)
-  putStrLn ("memory before and after 20,000 slow stops " ++ show (before, after))
+  putStrLn ("memory before and after 5,000 slow stops " ++ show (before, after))
   let spinning = alone ++ one ++ beside ++ nested
   promise (intercalate "; " spinning) (null spinning)
  where
