@@ -1,4 +1,4 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals reality ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals reality attacks ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -17,6 +17,7 @@ help:
 	@echo 'make soak      ever more random schedules and programs (SECONDS=600 for ten minutes)'
 	@echo 'make signals   SIGINT and SIGTERM at 1,000 random moments each (MOMENTS=100 for fewer)'
 	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
+	@echo 'make attacks   programs that try to break the promises (NAMES="Storm" selects)'
 	@echo 'make clean     remove what was built'
 
 demo:
@@ -46,6 +47,9 @@ signals:
 
 reality:
 	@.ci/reality $(SEED)
+
+attacks:
+	@.ci/attacks $(NAMES)
 
 ci:
 	@.ci/run

@@ -1,0 +1,66 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- What the attacks share. An attack is an action that returns when the promise was kept, and
+-- calls 'broken' when it was not.
+module Attack
+  ( broken
+  , living
+  , promise
+  , endsWithin
+  , inThread
+  , milliseconds
+  , Boom (..)
+  ) where
+
+import Control.Concurrent
+import Control.Exception
+import Control.Monad (unless)
+import Foreign (Ptr, peek)
+import System.Exit (ExitCode (..))
+import System.IO (hFlush, stdout)
+import System.Posix.Process (exitImmediately)
+
+-- | Says what is broken, and ends the process, whatever still runs.
+broken :: String -> IO a
+broken why = do
+  putStrLn ("BROKEN  " ++ why)
+  hFlush stdout
+  _ <- exitImmediately (ExitFailure 1)
+  throwIO (ErrorCall why)
+
+-- | How many threads the library started that have not ended.
+living :: IO Int
+living = peek threads
+
+foreign import ccall "&behavior_lang_threads" threads :: Ptr Int
+
+promise :: String -> Bool -> IO ()
+promise what kept = unless kept (broken what)
+
+-- | How the action ended in a thread of its own, which must be within so many milliseconds.
+-- The first function is told the thread.
+endsWithin :: Int -> String -> (ThreadId -> IO ()) -> IO a -> IO (Either SomeException a)
+endsWithin limit what meanwhile act = do
+  box <- newEmptyMVar
+  thread <- mask_ $ forkIOWithUnmask (\unmask -> try (unmask act) >>= putMVar box)
+  meanwhile thread
+  waiting limit box
+ where
+  waiting n box =
+    tryTakeMVar box >>= \over -> case over of
+      Just end -> pure end
+      Nothing
+        | n <= 0 -> broken (what ++ ": this was not over after " ++ show limit ++ " ms")
+        | otherwise -> threadDelay 1000 >> waiting (n - 1) box
+
+inThread :: Int -> String -> IO a -> IO (Either SomeException a)
+inThread limit what = endsWithin limit what (const (pure ()))
+
+milliseconds :: Int -> IO ()
+milliseconds n = threadDelay (n * 1000)
+
+newtype Boom = Boom Int
+  deriving (Eq, Show)
+
+instance Exception Boom

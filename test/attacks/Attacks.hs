@@ -1,0 +1,51 @@
+-- | Runs one attack by its name; without a name it says which there are.
+module Main (main) where
+
+import System.Environment (getArgs)
+import System.Exit (die)
+
+import qualified DeadCleanup
+import qualified IndirectThrow
+import qualified NestedLimits
+import qualified NurseryRaces
+import qualified ReactiveThrow
+import qualified SimEnds
+import qualified SharedFilters
+import qualified SimGhc
+import qualified StuckMasked
+import qualified SlowStops
+import qualified Storm
+import qualified StuckLimits
+import qualified UndefinedOutside
+import qualified UninterruptibleCaller
+
+main :: IO ()
+main = do
+  arguments <- getArgs
+  case arguments of
+    [] -> mapM_ (putStrLn . fst) attacks
+    [name] | Just attack <- lookup name (attacks ++ documented) -> attack
+    _ -> die "attacks: the argument is the name of one"
+
+attacks :: [(String, IO ())]
+attacks =
+  [ ("DeadCleanup", DeadCleanup.attack)
+  , ("NestedLimits", NestedLimits.attack)
+  , ("NurseryRaces", NurseryRaces.attack)
+  , ("ReactiveThrow", ReactiveThrow.attack)
+  , ("SimEnds", SimEnds.attack)
+  , ("SharedFilters", SharedFilters.attack)
+  , ("SimGhc", SimGhc.attack)
+  , ("StuckMasked", StuckMasked.attack)
+  , ("SlowStops", SlowStops.attack)
+  , ("Storm", Storm.attack)
+  , ("StuckLimits", StuckLimits.attack)
+  , ("UndefinedOutside", UndefinedOutside.attack)
+  ]
+
+-- | Those that hang, as the page of "Behavior" says ("What GHC limits").
+documented :: [(String, IO ())]
+documented =
+  [ ("IndirectThrow", IndirectThrow.attack)
+  , ("UninterruptibleCaller", UninterruptibleCaller.attack)
+  ]

@@ -1,0 +1,54 @@
+-- | Attacks: children that are stopped, awaited and forked from everywhere, also as all ends. Must
+-- come out: nobody waits for ever, nothing is left, many children take constant memory.
+module NurseryRaces (attack) where
+
+import Control.Concurrent
+import Control.Exception
+import Control.Monad (forM, forM_, replicateM_, void)
+import GHC.Stats
+
+import Attack
+import Behavior
+import Behavior.Parallel
+import Behavior.STM (atomically)
+import System.IO (hFlush, stdout)
+import System.Mem (performMajorGC)
+
+attack :: IO ()
+attack = do
+  forM_ [1 .. 2000 :: Int] $ \k -> do
+    end <- endsWithin 10000 ("race " ++ show k) (\t -> void (forkIO (threadDelay (k `mod` 300) >> throwTo t (Boom k)))) $
+      scoped $ \nursery -> do
+        children <- forM [1 .. 5 :: Int] $ \i -> fork nursery (threadDelay (i * 20) `finally` (fork nursery (pure ()) ? failed))
+        -- Each awaits the one before in its cleanup, and stops it.
+        void $ forM (zip children (drop 1 children)) $ \(a, b) ->
+          fork nursery (milliseconds 3600000 `finally` (requestStop a >> requestStop b >> (atomically (void (await a)) ? pure ())))
+        forM_ children requestStop
+        forM_ children (\c -> (void (atomically (await c)) ? pure ()) `finally` requestStop c)
+    end `seq` pure ()
+    n <- living
+    promise ("race " ++ show k ++ ": " ++ show n ++ " threads were left") (n == 0)
+  putStrLn "races held" >> hFlush stdout
+  -- A child that is stopped has not failed its scope; one that completes all the same has a result.
+  replicateM_ 2000 $ do
+    r <- inThread 5000 "a stop" $ scoped $ \nursery -> do
+      c <- fork nursery (('y' <$ milliseconds 3600000) `catch` \e -> const (pure 'x') (e :: SomeAsyncException))
+      yield
+      requestStop c
+      atomically (await c) ? pure 'n'
+    case r of
+      Right c -> promise ("result " ++ [c]) (c `elem` "xn")
+      Left e -> broken (show e)
+  putStrLn "stops held" >> hFlush stdout
+  enabled <- getRTSStatsEnabled
+  _ <- inThread 40000 "many children" $ scoped $ \nursery -> do
+    let some n = replicateM_ n (fork nursery (milliseconds 3600000) >>= \c -> requestStop c >> requestStop c >> (atomically (await c) ? pure ()))
+    some (5000 :: Int)
+    before <- resident enabled
+    forM_ [1 .. 10 :: Int] $ \_ -> some 5000
+    after <- resident enabled
+    promise ("memory " ++ show (before, after)) (after < before + 2000000)
+  pure ()
+ where
+  resident False = pure 0
+  resident True = performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats

@@ -1,0 +1,39 @@
+-- | Attacks: a cleanup that throws to the operator's caller, which may be masked where the
+-- operator stops the branch itself. Must come out: every operator ends, and none is left.
+module ReactiveThrow (attack) where
+
+import Control.Concurrent
+import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+import Control.Exception
+import Control.Monad (forM_, void)
+import System.IO (hFlush, stdout)
+
+import Attack
+import Behavior
+import qualified Behavior.Signal as Signal
+import Behavior.Time (atomically, timeout)
+
+attack :: IO ()
+attack =
+  forM_ operators $ \(name, operator) ->
+    forM_ (("unmasked", id) : [("masked", mask_) | name /= "parallel"]) $ \(caller, around) -> do
+      putStrLn (name ++ ", " ++ caller) >> hFlush stdout
+      flag <- newTVarIO True
+      entered <- newEmptyMVar
+      _ <- forkIO (takeMVar entered >> milliseconds 5 >> atomically (writeTVar flag False))
+      _ <- inThread 3000 (name ++ ", " ++ caller) $ do
+        me <- myThreadId
+        (around :: IO () -> IO ()) (operator (Signal.watching (readTVar flag)) ((putMVar entered () >> milliseconds 3600000) `finally` throwTo me (Boom 1)))
+        milliseconds 500
+      n <- living
+      promise (show n ++ " threads were left") (n == 0)
+
+operators :: [(String, Signal.Signal Bool -> IO () -> IO ())]
+operators =
+  [ ("parallel", \c act -> parallel act (Signal.waitUntil (not <$> c)))
+  , ("whileHolding", \c act -> Signal.whileHolding c act ? pure ())
+  , ("rSelect", \c act -> Signal.rSelect c act (pure ()))
+  , ("switch", \c act -> Signal.switch c (\k -> if k then act else pure ()))
+  , ("monitor", \c act -> Signal.monitor (not <$> c) failed act ? pure ())
+  , ("timeout", \_ act -> void (timeout 0.05 act) ? pure ())
+  ]

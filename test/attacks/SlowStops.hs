@@ -1,0 +1,69 @@
+-- | Attacks: many operators at once that wait for slow cleanups, and deep nests of them. Must come
+-- out: no processor time while they wait (promise 10), no memory and no thread after.
+module SlowStops (attack) where
+
+import Control.Concurrent
+import Control.Exception
+import Control.Monad (replicateM, replicateM_, void)
+import Data.List (intercalate)
+import System.CPUTime (getCPUTime)
+import GHC.Clock (getMonotonicTime)
+import GHC.Stats
+import System.Mem (performMajorGC)
+
+import Attack
+import Behavior
+
+attack :: IO ()
+attack = do
+  alone <- sideBySide "20,000 side by side, waited for without the library" (\gate -> do
+    box <- newEmptyMVar
+    _ <- forkIO (uninterruptibleMask_ (readMVar gate) `finally` putMVar box ())
+    uninterruptibleMask_ (takeMVar box))
+  beside <- sideBySide "20,000 side by side" (\gate -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())))
+  one <- waiting "one alone" $ \gate -> do
+    done <- newEmptyMVar
+    _ <- forkIO (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())) `finally` putMVar done ())
+    pure (takeMVar done)
+  nested <- waiting "1,500 one inside the other" $ \gate -> do
+    let nest :: Int -> IO ()
+        nest 0 = milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)
+        nest n = both (nest (n - 1)) (milliseconds 3600000)
+    done <- newEmptyMVar
+    t <- forkIO (mask_ (nest 1500 `catch` \e -> const (pure ()) (e :: SomeException)) `finally` putMVar done ())
+    milliseconds 1500
+    void (forkIO (killThread t))
+    milliseconds 1000
+    pure (takeMVar done)
+  -- And many after one another.
+  let slowStop = mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (threadDelay 50)) (pure ()))
+  replicateM_ 2000 slowStop
+  before <- resident
+  replicateM_ 5000 slowStop
+  after <- resident
+  promise ("memory " ++ show (before, after)) (after < before + 1000000)
+  putStrLn ("memory before and after 5,000 slow stops " ++ show (before, after))
+  let spinning = alone ++ one ++ beside ++ nested
+  promise (intercalate "; " spinning) (null spinning)
+ where
+  sideBySide what one = waiting what $ \gate -> do
+    ends <- replicateM 20000 $ do
+      done <- newEmptyMVar
+      _ <- forkIO (one gate `finally` putMVar done ())
+      pure done
+    pure (mapM_ takeMVar ends)
+  waiting what begin = do
+    gate <- newEmptyMVar
+    finish <- begin gate
+    milliseconds 2000
+    (cpu, wall) <- (,) <$> getCPUTime <*> getMonotonicTime
+    milliseconds 3000
+    (cpu', wall') <- (,) <$> getCPUTime <*> getMonotonicTime
+    let share = fromIntegral (cpu' - cpu) / 1e12 / (wall' - wall) :: Double
+    putStrLn (what ++ ": " ++ show share ++ " of a processor while all wait")
+    putMVar gate ()
+    _ <- inThread 20000 what finish
+    n <- living
+    promise (what ++ ": " ++ show n ++ " threads were left") (n == 0)
+    pure [what ++ ": they used " ++ show share ++ " of a processor while they waited" | share >= 0.1]
+  resident = performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats

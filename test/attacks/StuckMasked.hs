@@ -1,0 +1,29 @@
+-- | Attacks: a limit around a masked operator expires while a cleanup stops a slow thread by throwTo.
+-- Must come out: the result or Nothing, as in GHC; no Timeout reaches what comes after the limit.
+module StuckMasked (attack) where
+
+import Control.Concurrent
+import Control.Exception
+import Control.Monad (forM, forM_, void)
+import System.Timeout (timeout)
+
+import Attack
+import Behavior
+
+attack :: IO ()
+attack = forM_ [1 .. 60 :: Int] $ \k -> do
+  ends <- forM [1 .. 40 :: Int] $ \i -> do
+    box <- newEmptyMVar
+    _ <- mask_ $ forkIOWithUnmask $ \unmask -> try (unmask (one (20000 + 1000 * i))) >>= putMVar box
+    pure box
+  forM_ ends $ \box ->
+    takeMVar box >>= either (\e -> void (broken ("round " ++ show k ++ ", escaped: " ++ show (e :: SomeException)))) pure
+ where
+  one limit = do
+    _ <- timeout limit (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ slow) (pure ())))
+    milliseconds 20
+  slow = do
+    deaf <- newEmptyMVar
+    other <- mask_ . forkIO $ uninterruptibleMask_ (putMVar deaf () >> milliseconds 70)
+    takeMVar deaf
+    killThread other
