@@ -9,15 +9,15 @@ module Behavior.PollingSpec (spec) where
 import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
-import Control.Monad (replicateM_, unless, void, when)
+import Control.Monad (forever, replicateM_, unless, void, when)
 import Data.Foldable (for_)
 import Data.List (group)
 import Test.Hspec hiding (after, before)
 
-import Behavior (Behavior, Seconds, sleep)
+import Behavior (Behavior, Seconds, sleep, (|||))
 import Behavior.Internal.Runtime (Event (..), Label (..), atomically, now, reportingTo)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (simulate)
+import Behavior.Sim (Options (scheduled, slip), Schedule (Seeded), defaults, simulate, simulateWith)
 import Support
 import Watched
 
@@ -61,6 +61,13 @@ slots = do
     since <- now
     Signal.waitUntil (Signal.polling 0.001 (sensor level))
     notes times >>= \all' -> apart 0.001 all' >> noMoreThan 0.001 since all'
+
+  it "a reading that is late does not delay the slots after it" $
+    for_ [1 .. 5] $ \seed -> do
+      book <- newNotebook
+      let late = Signal.polling 0.01 (False <$ note book ())
+      _ <- simulateWith defaults {slip = 0.004, scheduled = Seeded seed} (Signal.monitor late (pure ()) (sleep 5 ||| forever (sleep 0.0031)))
+      length <$> notes book >>= (`shouldSatisfy` (`elem` [500, 501]))
 
   it "a slow reading skips the slots that it missed, and is not made up for" $ do
     times <- newNotebook
