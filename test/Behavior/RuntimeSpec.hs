@@ -231,7 +231,6 @@ scopes = do
       pass inside
       ask [SomeBranch started]
       ask [SomeBranch started]
-      askWithoutWaiting [SomeBranch started]
       pass cleaning
       open mayEnd
       pure (pure ())
@@ -243,7 +242,7 @@ scopes = do
       mayEnd <- newGate
       started <- traverse (\inside -> branch scope label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) insides
       traverse_ pass insides
-      askWithoutWaiting (map SomeBranch (started :: [Branch ()]))
+      ask (map SomeBranch (started :: [Branch ()]))
       note notebook "asked"
       open mayEnd
       pure (pure ())

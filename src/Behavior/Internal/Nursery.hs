@@ -114,7 +114,7 @@ serving stage scope body = do
                 living <- filterM mayLive children'
                 serve count' living (count' + max 16 (length living))
       doing (count, children) = \case
-        Stop child -> (count, children) <$ askWithoutWaiting [child]
+        Stop child -> (count, children) <$ ask [child]
         Fork act accepted -> do
           let n = count + 1 :: Int
           -- Masked: what was started is also handed over.

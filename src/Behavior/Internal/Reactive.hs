@@ -102,7 +102,7 @@ follow engine sensors seen = \case
   SensorDied e -> pure (throwIO e)
   Changed _ (Conclude verdict) -> pure verdict
   Changed _ (RunToEnd name recovery) -> do
-    askWithoutWaiting (map SomeBranch sensors)
+    ask (map SomeBranch sensors)
     recover engine sensors name recovery Nothing
   Changed old Idle -> atomically (changedFrom old) >>= follow engine sensors seen
   Changed old (Run name act) -> do

@@ -32,7 +32,6 @@ module Behavior.Internal.Scope
   , worker
   , forget
   , ask
-  , askWithoutWaiting
 
     -- * How a branch ends
   , Outcome (..)
@@ -58,7 +57,6 @@ import Control.Exception
   , getMaskingState
   , mask
   , mask_
-  , onException
   , throwIO
   , try
   )
@@ -149,26 +147,24 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 end :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
 end (Scope branches) state before = do
   newestFirst <- readIORef branches
-  (thrown, ()) <- once before (ask newestFirst) (askWithoutWaiting newestFirst)
-  fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
+  ask newestFirst
+  fmap reverse <$> foldM withFault (before, []) (reverse newestFirst)
  where
   withFault (thrown, faults) (SomeBranch b) = do
-    (thrown', o) <-
-      unlessAtAGlance (fmap ((,) thrown) <$> outcomeNow b) $
-        once thrown (atomically (outcome b)) (firmly (atomically (outcome b)))
+    (thrown', o) <- unlessAtAGlance (fmap ((,) thrown) <$> outcomeNow b) (awaiting thrown b)
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)
-  -- The first can be interrupted; then the second is done.
-  once thrown interruptibly uninterruptibly = case thrown of
+  -- Waits so that it can be interrupted; then so that it cannot.
+  awaiting thrown b = case thrown of
     Nothing | state == Unmasked -> do
-      tried <- try interruptibly
-      case tried of
-        Right a -> pure (Nothing, a)
+      awaited <- try (atomically (outcome b))
+      case awaited of
+        Right o -> pure (Nothing, o)
         Left e -> do
           deadlocked <- isDeadlock e
-          (,) (if deadlocked then Nothing else Just e) <$> uninterruptibly
-    _ -> (,) thrown <$> uninterruptibly
+          (,) (if deadlocked then Nothing else Just e) <$> firmly (atomically (outcome b))
+    _ -> (,) thrown <$> firmly (atomically (outcome b))
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
@@ -202,36 +198,15 @@ forget (Scope branches) old = modifyIORef' branches without
     | branchId b == branchId old = others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
--- | Asks branches (the newest first) to stop, all at once: none hears it later because
--- another cannot be interrupted just now. Returns when the newest has heard it.
---
--- Whoever waits for that can be interrupted, if it lets itself be. Then that newest one
--- counts as not asked.
+-- | Asks branches to stop, all at once, by threads of its own: none receives it later because
+-- another cannot be interrupted just now. It does not wait until they have; so nothing that
+-- interrupts the caller withdraws what it has asked for.
 ask :: [SomeBranch] -> IO ()
-ask = mask_ . asking
- where
-  asking [] = pure ()
-  asking (SomeBranch b : older) = do
-    needed <- marked b
-    if needed
-      then do
-        askByMessengers older
-        interrupt (branchId b) (stopping b) `onException` writeIORef (branchAsked b) False
-      else asking older
-
--- | Asks branches to stop, all at once, and does not wait for any to hear it.
-askWithoutWaiting :: [SomeBranch] -> IO ()
-askWithoutWaiting = mask_ . askByMessengers
-
-askByMessengers :: [SomeBranch] -> IO ()
-askByMessengers branches = foldM asked [] branches >>= interruptByMessengers Stop
+ask branches = mask_ $ foldM asked [] branches >>= interruptByMessengers Stop
  where
   asked threads (SomeBranch b) = do
     needed <- marked b
     pure $! if needed then branchId b : threads else threads
-
-stopping :: Branch a -> Stop
-stopping = Stop . branchId
 
 -- | Marks a branch as asked. False if it was asked before, or has ended.
 marked :: Branch a -> IO Bool
