@@ -1,3 +1,4 @@
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
@@ -48,7 +49,7 @@ endsWithin limit what meanwhile act = do
   waiting limit box
  where
   waiting n box =
-    tryTakeMVar box >>= \over -> case over of
+    tryTakeMVar box >>= \case
       Just end -> pure end
       Nothing
         | n <= 0 -> broken (what ++ ": this was not over after " ++ show limit ++ " ms")

@@ -42,7 +42,7 @@ ways =
   [ ("directly", id)
   , ("in both", \act -> both act (pure ()))
   , ("in allOf", \act -> void (allOf [act, pure ()]))
-  , ("in monitor", \act -> monitor (pure False) (pure ()) act)
+  , ("in monitor", monitor (pure False) (pure ()))
   , ("in a child that is awaited", \act -> scoped (\n -> fork n act >>= \c -> atomically (P.await c)))
   , ("in async's concurrently", \act -> Async.concurrently_ act (pure ()))
   ]

@@ -4,7 +4,7 @@ module NestedLimits (attack) where
 
 import Control.Concurrent
 import Control.Exception
-import Control.Monad (forM_)
+import Control.Monad (forM_, void)
 import Data.List (permutations)
 import System.Timeout (timeout)
 
@@ -31,7 +31,7 @@ attack =
     , ("both", \act -> both hang (hang `finally` act))
     , ("in three", \act -> both hang (both hang (parallel hang (hang `finally` act))))
     , ("firstOf", \act -> firstOf [hang `finally` act, hang])
-    , ("allOf", \act -> () <$ allOf [hang, hang `finally` act])
+    , ("allOf", \act -> void (allOf [hang, hang `finally` act]))
     , ("scoped", \act -> scoped (const (hang `finally` act)))
     , ("whileHolding", \act -> Signal.whileHolding (pure True) (hang `finally` act))
     , ("withShared", \act -> Signal.withShared (pure ()) (const (hang `finally` act)))

@@ -1,3 +1,5 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- | Attacks: children that are stopped, awaited and forked from everywhere, also as all ends. Must
 -- come out: nobody waits for ever, nothing is left, many children take constant memory.
 module NurseryRaces (attack) where
@@ -21,7 +23,7 @@ attack = do
       scoped $ \nursery -> do
         children <- forM [1 .. 5 :: Int] $ \i -> fork nursery (threadDelay (i * 20) `finally` (fork nursery (pure ()) ? failed))
         -- Each awaits the one before in its cleanup, and stops it.
-        void $ forM (zip children (drop 1 children)) $ \(a, b) ->
+        forM_ (zip children (drop 1 children)) $ \(a, b) ->
           fork nursery (milliseconds 3600000 `finally` (requestStop a >> requestStop b >> (atomically (void (await a)) ? pure ())))
         forM_ children requestStop
         forM_ children (\c -> (void (atomically (await c)) ? pure ()) `finally` requestStop c)
@@ -32,7 +34,7 @@ attack = do
   -- A child that is stopped has not failed its scope; one that completes all the same has a result.
   replicateM_ 2000 $ do
     r <- inThread 5000 "a stop" $ scoped $ \nursery -> do
-      c <- fork nursery (('y' <$ milliseconds 3600000) `catch` \e -> const (pure 'x') (e :: SomeAsyncException))
+      c <- fork nursery (('y' <$ milliseconds 3600000) `catch` \(_ :: SomeAsyncException) -> pure 'x')
       yield
       requestStop c
       atomically (await c) ? pure 'n'

@@ -9,6 +9,8 @@ import Data.IORef
 import GHC.Stats
 import System.Mem (performMajorGC)
 
+import Data.Maybe (isJust)
+
 import Attack
 import Behavior
 import Behavior.Parallel (allOf, firstOf)
@@ -76,8 +78,8 @@ attack = do
   set v x = atomically (writeTVar v x)
   is what s expected = Signal.rSelect s (pure True) (pure False) >>= \got -> promise (what ++ ": " ++ show got) (got == expected)
   ended what act = inThread 30000 what act >>= either (\e -> void (broken (what ++ ": " ++ show e))) pure >> none what
-  faulted what act = inThread 5000 what act >>= either (\e -> promise (what ++ ": " ++ show e) (maybe False (const True) (fromException e :: Maybe Boom))) (const (void (broken what))) >> none what
-  failing what act = inThread 5000 what act >>= either (\e -> promise (what ++ ": " ++ show e) (maybe False (const True) (fromException e :: Maybe BehaviorFailed))) (const (void (broken what))) >> none what
+  faulted what act = inThread 5000 what act >>= either (\e -> promise (what ++ ": " ++ show e) (isJust (fromException e :: Maybe Boom))) (const (void (broken what))) >> none what
+  failing what act = inThread 5000 what act >>= either (\e -> promise (what ++ ": " ++ show e) (isJust (fromException e :: Maybe BehaviorFailed))) (const (void (broken what))) >> none what
   none what = living >>= \n -> promise (what ++ ": " ++ show n ++ " threads were left") (n == 0)
   resident False = pure 0
   resident True = performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats

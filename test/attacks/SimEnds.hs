@@ -1,3 +1,5 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- | Attacks: the simulator. 100,000 runs with pending exceptions, and runs that are interrupted at
 -- random moments. Must come out: same seed, same run; no thread, no memory, no hang is left.
 module SimEnds (attack) where
@@ -48,12 +50,12 @@ program = do
     c <- fork n (masked 1)
     d <- fork n (masked 0.3 `finally` requestStop c)
     requestStop d >> requestStop c >> sleep 0.1)) :: IO (Either SomeException ())
-  r <- try (parallel (both (masked 0.3) (sleep 0.2 >> failed)) (Signal.waitUntil (Signal.polling 0.05 ((> 0.3) <$> pure (0 :: Double))))) :: IO (Either SomeException ())
+  r <- try (parallel (both (masked 0.3) (sleep 0.2 >> failed)) (Signal.waitUntil (Signal.polling 0.05 (pure False)))) :: IO (Either SomeException ())
   _ <- try (void (allOf [masked 0.1 >> throwIO (Boom 1), sleep 1 `finally` throwIO (Boom 2)])) :: IO (Either SomeException ())
   pure (show r)
  where
   masked d = do
     mask_ (checkpoint' >> checkpoint') `finally` checkpoint'
     uninterruptibleMask_ (sleep d)
-    mask_ (sleep d `catch` \e -> const (checkpoint') (e :: Boom))
+    mask_ (sleep d `catch` \(_ :: Boom) -> checkpoint')
   checkpoint' = sleep 0

@@ -1,3 +1,5 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- | Attacks: what the simulator says of masks and several stops. Must come out: what many real runs of
 -- the same program show is among what its schedules show; what GHC fixes is one and the same.
 module SimGhc (attack) where
@@ -15,7 +17,7 @@ import Behavior.Time (atomically, timeout)
 
 attack :: IO ()
 attack = forM_ programs $ \(name, fixed, program) -> do
-  simulated <- sort . nub <$> forM [1 .. 2000] (\seed -> run =<< (explained <$> simulateWith defaults {scheduled = Seeded seed} program))
+  simulated <- sort . nub <$> forM [1 .. 2000] (\seed -> simulateWith defaults {scheduled = Seeded seed} program >>= run . explained)
   real <- sort . nub <$> forM [1 .. 300 :: Int] (\_ -> inThread 5000 name program >>= run)
   putStrLn (name ++ ": " ++ show simulated ++ " and really " ++ show real)
   promise (name ++ ": really " ++ show real ++ ", and simulated " ++ show simulated) (all (`elem` simulated) real)
@@ -27,7 +29,7 @@ attack = forM_ programs $ \(name, fixed, program) -> do
     Failing e -> Left e
     Faulting e -> Left e
     Cancelled e -> Left e
-    other -> Right (explain (other))
+    other -> Right (explain other)
 
 -- | Each with whether GHC fixes what comes out.
 programs :: [(String, Bool, IO String)]
@@ -52,7 +54,7 @@ programs =
   , ("a child that completes all the same", True, logged $ \say ->
       scoped $ \n -> do
         started <- newTVarIO False
-        c <- fork n (mask_ (atomically (writeTVar started True) >> (sleep 100 `catch` \e -> const (pure ()) (e :: SomeException)) >> pure "done"))
+        c <- fork n (mask_ (atomically (writeTVar started True) >> (sleep 100 `catch` \(_ :: SomeException) -> pure ()) >> pure "done"))
         atomically (readTVar started >>= check)
         requestStop c
         atomically (await c) >>= say)

@@ -1,3 +1,5 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
 -- | Attacks: many operators at once that wait for slow cleanups, and deep nests of them. Must come
 -- out: no processor time while they wait (promise 10), no memory and no thread after.
 module SlowStops (attack) where
@@ -30,7 +32,7 @@ attack = do
         nest 0 = milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)
         nest n = both (nest (n - 1)) (milliseconds 3600000)
     done <- newEmptyMVar
-    t <- forkIO (mask_ (nest 1500 `catch` \e -> const (pure ()) (e :: SomeException)) `finally` putMVar done ())
+    t <- forkIO (mask_ (nest 1500 `catch` \(_ :: SomeException) -> pure ()) `finally` putMVar done ())
     milliseconds 1500
     void (forkIO (killThread t))
     milliseconds 1000

@@ -48,7 +48,7 @@ attack = do
             2 -> a ? b
             3 -> firstOf [a, b]
             4 -> void (allOf [a, b])
-            5 -> scoped (\nursery -> fork nursery a >>= \c -> (b `finally` requestStop c))
+            5 -> scoped (\nursery -> fork nursery a >>= \c -> b `finally` requestStop c)
             6 -> Signal.monitor (pure False) a b
             7 -> monitor (pure False) a b
             8 -> void (Time.timeout 0.0003 a) ? b
@@ -58,9 +58,8 @@ attack = do
     waits <- mapM (\_ -> below 800) [1 .. 3 :: Int]
     inner <- below 900
     heard <- newIORef (0 :: Int)
-    end <- endsWithin 20000 ("storm " ++ show k) (\t -> do
-      forM_ (zip [1 ..] waits) $ \(i, w) -> forkIO (threadDelay w >> throwTo t (if even (k + i) then toException (Boom (-i)) else toException ThreadKilled))
-      pure ()) $ do
+    end <- endsWithin 20000 ("storm " ++ show k) (\t ->
+      forM_ (zip [1 ..] waits) $ \(i, w) -> forkIO (threadDelay w >> throwTo t (if even (k + i) then toException (Boom (-i)) else toException ThreadKilled))) $ do
         r <- try (timeout inner behavior) :: IO (Either SomeException (Maybe ()))
         uninterruptibleMask_ $ do
           n <- readIORef inside

@@ -4,7 +4,7 @@ module StuckMasked (attack) where
 
 import Control.Concurrent
 import Control.Exception
-import Control.Monad (forM, forM_, void)
+import Control.Monad (forM, forM_, void, (>=>))
 import System.Timeout (timeout)
 
 import Attack
@@ -16,8 +16,8 @@ attack = forM_ [1 .. 60 :: Int] $ \k -> do
     box <- newEmptyMVar
     _ <- mask_ $ forkIOWithUnmask $ \unmask -> try (unmask (one (20000 + 1000 * i))) >>= putMVar box
     pure box
-  forM_ ends $ \box ->
-    takeMVar box >>= either (\e -> void (broken ("round " ++ show k ++ ", escaped: " ++ show (e :: SomeException)))) pure
+  forM_ ends $
+    takeMVar >=> either (\e -> void (broken ("round " ++ show k ++ ", escaped: " ++ show (e :: SomeException)))) pure
  where
   one limit = do
     _ <- timeout limit (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ slow) (pure ())))
