@@ -71,7 +71,7 @@ rover hardware beds = mission `finallyAlways` (motorsOff hardware `finally` armP
           Signal.withShared (Signal.hysteresis True 20 80 battery) $ \charged -> do
             let r = permitted {position = place}
             underOrders r (inMode r charged beds)
-  battery = Signal.polling 1 (batteryLevel hardware)
+  battery = Signal.polling 0.5 (batteryLevel hardware)
 
 -- | Ends the behaviour when the emergency stop is pressed. The motors are switched off at
 -- once, while the behaviour is still being stopped; and as there is no permit any more, it

@@ -26,15 +26,15 @@ main = do
       calm
         { battery = [(0, 100), (3, 19.4), (3.5, 20.3)]
         , emergency = (0, False) : [(seconds, True) | seconds <- pressed]
-        , bumps = [(0, False), (0.8, True)]
+        , bumps = [(0, False), (1.2, True)]
         , someone = [(0, False), (4, True), (6, False)]
         , pictures = \bed -> [hangs | bed == Bed North 1] ++ pictures calm bed
         , logged = putStrLn
         }
   let hardware = mock {armPark = armPark mock >> putStrLn "the motors are off, the arm is parked"}
-  beds <- newBeds [Bed North 1, Bed South 1]
+  beds <- newBeds [Bed North 1]
   runBehavior . scoped $ \nursery -> do
-    _ <- fork nursery (sleep 2 >> atomically (addBed beds (Bed South 2)))
+    _ <- fork nursery (sleep 2 >> atomically (addBed beds (Bed South 1)))
     found <- rover hardware beds
     mapM_ print (Map.toList found)
 

@@ -27,8 +27,8 @@ spec = guarded $ do
   describe "A mission" missions
   describe "Under many schedules" manySchedules
   it "keeps its rules on real threads too" $ do
-    (world, hardware) <- greenhouses calm {emergency = pressedAt 0.5}
-    _ <- condition world later (pressedAt 0.6)
+    (world, hardware) <- greenhouses calm {emergency = pressedAt 1}
+    _ <- condition world later (pressedAt 1.1)
     beds <- newBeds [Bed North 1]
     try (rover hardware beds) `shouldReturn` Left EmergencyStopped
     world `shouldRecord` safely <> stopped
@@ -62,17 +62,17 @@ missions = do
     (found, record) <- inspecting [Bed North 1, Bed North 2] calm {pictures = \bed -> if bed == Bed North 1 then [hangs] else pictures calm bed}
     found `shouldBe` Map.fromList [(Bed North 1, NotSeen "timed out after 2.0 s"), seen (Bed North 2)]
     [happenedAt e | e <- entries record, subject e == "camera", argument e == "Bed North 1", happening e == Begins]
-      `shouldBe` [1.75, 4.75, 7.75]
+      `shouldBe` [2.25, 5.25, 8.25]
   it "opens the door only while no-one is near" $ do
     (_, record) <- inspecting [Bed South 1] calm {someone = [(0, True), (5, False), (5.3, True), (7, False)]}
     record `shouldSatisfy` holds (never (successOf "open door" `during` being "someone near" True))
     record `shouldSatisfy` holds (exactly 1 (interruptionOf "open door") <> eventually (successOf "open door"))
   it "backs off when it bumps into something, and drives on" $ do
-    (found, record) <- inspecting [Bed North 1] calm {bumps = [(0, False), (0.7, True)]}
+    (found, record) <- inspecting [Bed North 1] calm {bumps = [(0, False), (1.2, True)]}
     Map.size found `shouldBe` 1
     record `shouldSatisfy` holds (interruptionOf "steer to" `comesBefore` startOf "back off")
   it "stands still without a radio link, and goes on when it is back" $ do
-    (found, record) <- inspecting [Bed North 1, Bed North 2] calm {radio = replicate 4 succeeds ++ [hangs, hangs, succeeds]}
+    (found, record) <- inspecting [Bed North 1, Bed North 2] calm {radio = [succeeds, hangs, hangs, succeeds]}
     Map.size found `shouldBe` 2
     record `shouldSatisfy` holds (once [Bed North 1, Bed North 2] <> exactly 1 (interruptionOf "steer to"))
     record `shouldSatisfy` holds (whenever (interruptionOf "steer to") (withinSeconds 1 (becoming "motors" False)))
