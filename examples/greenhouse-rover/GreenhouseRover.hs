@@ -11,7 +11,7 @@ module GreenhouseRover
   ) where
 
 import Control.Exception (Exception (..), IOException, bracket_, finally, mask_, throwIO, try, uninterruptibleMask_)
-import Control.Monad (forever, unless)
+import Control.Monad (forever, unless, void)
 import qualified Data.Map.Strict as Map
 
 import Beds
@@ -89,7 +89,7 @@ untilEmergency r act = do
 logging :: Rover -> (Rover -> Behavior a) -> Behavior a
 logging r act = do
   entries <- newTQueueIO
-  let write line = () <$ tryAny (writeLog r line)
+  let write line = void (tryAny (writeLog r line))
       writeRest = atomically (flushTQueue entries) >>= mapM_ write
   scoped $ \nursery -> do
     _ <- fork nursery (forever (atomically (readTQueue entries) >>= write) `finally` writeRest)
@@ -160,7 +160,7 @@ photograph r beds bed = shot ? attempt 2 (sleep 1 >> shot)
 -- | Drives to the place, through the door if it is in the other house.
 drive :: Rover -> Place -> Behavior ()
 drive r place = do
-  here <- Signal.switch (position r) pure
+  here <- Signal.switch (position r) pure -- as it is now
   unless (here == place) $
     if houseOf here == houseOf place
       then move

@@ -34,7 +34,7 @@ calm =
     , orders = [(0, Auto)]
     , radio = [succeeds]
     , pictures = \bed -> [returning ("picture of " ++ show bed) `taking` 0.25]
-    , docks = \_ -> [succeeds `taking` 2]
+    , docks = const [succeeds `taking` 2]
     , logged = \_ -> pure ()
     }
 
