@@ -10,7 +10,16 @@ module GreenhouseRover
   , rover
   ) where
 
-import Control.Exception (Exception (..), IOException, bracket_, finally, mask_, throwIO, try, uninterruptibleMask_)
+import Control.Exception
+  ( Exception (..)
+  , IOException
+  , bracket_
+  , finally
+  , mask_
+  , throwIO
+  , try
+  , uninterruptibleMask_
+  )
 import Control.Monad (forever, unless, void)
 import qualified Data.Map.Strict as Map
 
@@ -46,7 +55,7 @@ data Rover = Rover
   , batteryLevel :: Behavior Double
   -- ^ Percent, with noise.
   , plugIn :: House -> Behavior ()
-  -- ^ Charges at the dock of this house. Fails when another rover is there.
+  -- ^ Begins to charge at the dock of this house. Fails when another rover is there.
   , askMode :: Behavior Mode
   -- ^ Asks the operator by radio. Hangs when the radio link is lost.
   , writeLog :: String -> Behavior ()
@@ -100,7 +109,7 @@ logging r act = do
 underOrders :: Rover -> (Mode -> Behavior a) -> Behavior a
 underOrders r act = do
   -- A failure of the branch is its result here. What is left is a failure of the signal.
-  ended <- tryFailure (Signal.switch (Signal.debounce 0.3 mode) (tryFailure . act))
+  ended <- tryFailure (Signal.switch (Signal.debounce 0.8 mode) (tryFailure . act))
   case ended of
     Right result -> either throwIO pure result
     Left lost -> do
@@ -125,8 +134,10 @@ inMode r charged beds mode = do
 recharge :: Rover -> Signal Bool -> Behavior ()
 recharge r charged = do
   writeLog r "recharge ..."
-  fallbackOver [North, South] $ \house -> drive r (AtDock house) >> plugIn r house
-  Signal.waitUntil charged
+  fallbackOver [North, South] $ \house -> do
+    drive r (AtDock house)
+    plugIn r house
+    timeout 600 (Signal.waitUntil charged)
 
 -- | Until nothing is left on the list, also nothing that was added meanwhile.
 inspectAll :: Rover -> Beds -> Behavior (Map.Map Bed Finding)
