@@ -91,12 +91,12 @@ missions = do
   occupied house = if house == North then [fails "occupied"] else docks calm house
   hanging bed = if bed == Bed North 1 then [hangs] else pictures calm bed
   -- The first change is too short to count.
-  switched = [(0, Auto), (3, Manual), (3.4, Auto), (5, Manual), (7, Park), (9, Auto)]
+  switched = [(0, Auto), (2.9, Manual), (3.4, Auto), (5, Manual), (7, Park), (9, Auto)]
 
 manySchedules :: Spec
 manySchedules = do
   it "stops its motors and parks its arm, whenever the emergency stop is pressed" $
-    for_ (quarters 36) $ \moment ->
+    for_ (quarters 24) $ \moment ->
       explored 5 calm {emergency = pressedAt moment, battery = [(0, 100), (3, 15)]} $ \world run -> do
         case outcome run of
           Failing e | Just EmergencyStopped <- fromException e -> pure ()
