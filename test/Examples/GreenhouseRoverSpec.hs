@@ -81,6 +81,7 @@ missions = do
     (found, world) <- inspecting [Bed North 1, Bed North 2] calm {orders = switched}
     Map.size found `shouldBe` 2
     world `shouldRecord` once [Bed North 1, Bed North 2] <> exactly 1 (startOf "joystick")
+    world `shouldRecord` withinSeconds 2.5 (startOf "camera Bed North 1")
   it "keeps a log, and goes on without" $ do
     written <- newIORef []
     _ <- inspecting [Bed North 1] calm {logged = \line -> modifyIORef written (line :)}
@@ -91,7 +92,7 @@ missions = do
   occupied house = if house == North then [fails "occupied"] else docks calm house
   hanging bed = if bed == Bed North 1 then [hangs] else pictures calm bed
   -- The first change is too short to count.
-  switched = [(0, Auto), (2.9, Manual), (3.4, Auto), (5, Manual), (7, Park), (9, Auto)]
+  switched = [(0, Auto), (0.9, Manual), (1.4, Auto), (5, Manual), (7, Park), (9, Auto)]
 
 manySchedules :: Spec
 manySchedules = do
