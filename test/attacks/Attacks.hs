@@ -6,14 +6,17 @@ import System.Exit (die)
 
 import qualified DeadCleanup
 import qualified IndirectThrow
+import qualified LateRecovery
 import qualified NestedLimits
 import qualified NurseryRaces
 import qualified ReactiveThrow
+import qualified SimBusy
 import qualified SimEnds
 import qualified SharedFilters
 import qualified SimGhc
 import qualified StuckMasked
 import qualified SlowStops
+import qualified StopsOnce
 import qualified Storm
 import qualified StuckLimits
 import qualified UndefinedOutside
@@ -30,14 +33,17 @@ main = do
 attacks :: [(String, IO ())]
 attacks =
   [ ("DeadCleanup", DeadCleanup.attack)
+  , ("LateRecovery", LateRecovery.attack)
   , ("NestedLimits", NestedLimits.attack)
   , ("NurseryRaces", NurseryRaces.attack)
   , ("ReactiveThrow", ReactiveThrow.attack)
+  , ("SimBusy", SimBusy.attack)
   , ("SimEnds", SimEnds.attack)
   , ("SharedFilters", SharedFilters.attack)
   , ("SimGhc", SimGhc.attack)
   , ("StuckMasked", StuckMasked.attack)
   , ("SlowStops", SlowStops.attack)
+  , ("StopsOnce", StopsOnce.attack)
   , ("Storm", Storm.attack)
   , ("StuckLimits", StuckLimits.attack)
   , ("UndefinedOutside", UndefinedOutside.attack)

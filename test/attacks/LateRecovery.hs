@@ -1,0 +1,64 @@
+-- | Attacks: the task ends just when the condition becomes true, and the sensor is deaf for 1.5 s. Must
+-- come out: the recovery begins at once, and does not wait until the sensor has been stopped.
+module LateRecovery (attack) where
+
+import Control.Concurrent
+import Control.Concurrent.STM (atomically, check, newTVarIO, readTVar, writeTVar)
+import Control.Exception
+import Control.Monad (forM, unless, when)
+import Data.IORef
+import Data.Maybe (catMaybes)
+import GHC.Clock (getMonotonicTime)
+import System.Environment (getExecutablePath, lookupEnv)
+import System.Posix.Process (executeFile)
+
+import Attack
+import Behavior hiding (monitor)
+import Behavior.Signal (monitor, polling, watching)
+
+-- | The moment between the operator's look and its stop request is short. With @-C0@ GHC switches
+-- threads wherever it can, so there too; that can be said only as a program begins.
+attack :: IO ()
+attack = do
+  again <- lookupEnv "ATTACK_AGAIN"
+  when (again == Nothing) $ do
+    program <- getExecutablePath
+    n <- getNumCapabilities
+    executeFile program False ["LateRecovery", "+RTS", "-C0", "-N" ++ show n] (Just [("ATTACK_AGAIN", "yes")])
+  boxes <- forM [1 .. 3000] $ \k -> do
+    box <- newEmptyMVar
+    box <$ forkIO (one k >>= putMVar box)
+  took <- catMaybes <$> mapM takeMVar boxes
+  let late = length (filter (> 0.75) took)
+  putStrLn (show (length took) ++ " recoveries, " ++ show late ++ " late, the last after " ++ show (maximum took) ++ " s")
+  promise (show late ++ " of " ++ show (length took) ++ " recoveries waited for the sensor") (late == 0)
+
+-- | How long after the change the recovery began.
+one :: Int -> IO (Maybe Double)
+one k = do
+  low <- newTVarIO False
+  deaf <- newTVarIO False
+  isFirst <- newIORef True
+  changed <- newIORef 0
+  begun <- newIORef Nothing
+  let reading = do
+        first <- atomicModifyIORef' isFirst ((,) False)
+        unless first $ uninterruptibleMask_ (atomically (writeTVar deaf True) >> milliseconds 1500)
+      task = do
+        over <- readIORef begun
+        when (over == Nothing) $ do
+          atomically (readTVar deaf >>= check)
+          atomically (readTVar low >>= check)
+          mapM_ (const yield) [1 .. k `mod` 10]
+          failed
+      recovery = do
+        getMonotonicTime >>= writeIORef begun . Just
+        atomically (writeTVar low False)
+  _ <- forkIO $ do
+    atomically (readTVar deaf >>= check)
+    threadDelay (1000 + 113 * k)
+    getMonotonicTime >>= writeIORef changed
+    atomically (writeTVar low True)
+  _ <- try (monitor (const <$> watching (readTVar low) <*> polling 0.0005 reading) recovery task) :: IO (Either SomeException ())
+  since <- readIORef changed
+  fmap (subtract since) <$> readIORef begun
