@@ -7,6 +7,7 @@ import System.Exit (die)
 import qualified DeadCleanup
 import qualified IndirectThrow
 import qualified LateRecovery
+import qualified MutualThrow
 import qualified NestedLimits
 import qualified NurseryRaces
 import qualified ReactiveThrow
@@ -34,6 +35,7 @@ attacks :: [(String, IO ())]
 attacks =
   [ ("DeadCleanup", DeadCleanup.attack)
   , ("LateRecovery", LateRecovery.attack)
+  , ("MutualThrow", MutualThrow.attack)
   , ("NestedLimits", NestedLimits.attack)
   , ("NurseryRaces", NurseryRaces.attack)
   , ("ReactiveThrow", ReactiveThrow.attack)
