@@ -15,6 +15,7 @@ import qualified SimBusy
 import qualified SimEnds
 import qualified SharedFilters
 import qualified SimGhc
+import qualified SimReality
 import qualified StuckMasked
 import qualified SlowStops
 import qualified StopsOnce
@@ -43,6 +44,7 @@ attacks =
   , ("SimEnds", SimEnds.attack)
   , ("SharedFilters", SharedFilters.attack)
   , ("SimGhc", SimGhc.attack)
+  , ("SimReality", SimReality.attack)
   , ("StuckMasked", StuckMasked.attack)
   , ("SlowStops", SlowStops.attack)
   , ("StopsOnce", StopsOnce.attack)

@@ -7,7 +7,7 @@ import Control.Concurrent.STM (atomically, check, newTVarIO, readTVar, writeTVar
 import Control.Exception
 import Control.Monad (forM, unless, when)
 import Data.IORef
-import Data.Maybe (catMaybes)
+import Data.Maybe (catMaybes, isNothing)
 import GHC.Clock (getMonotonicTime)
 import System.Environment (getExecutablePath, lookupEnv)
 import System.Posix.Process (executeFile)
@@ -21,7 +21,7 @@ import Behavior.Signal (monitor, polling, watching)
 attack :: IO ()
 attack = do
   again <- lookupEnv "ATTACK_AGAIN"
-  when (again == Nothing) $ do
+  when (isNothing again) $ do
     program <- getExecutablePath
     n <- getNumCapabilities
     executeFile program False ["LateRecovery", "+RTS", "-C0", "-N" ++ show n] (Just [("ATTACK_AGAIN", "yes")])
@@ -46,7 +46,7 @@ one k = do
         unless first $ uninterruptibleMask_ (atomically (writeTVar deaf True) >> milliseconds 1500)
       task = do
         over <- readIORef begun
-        when (over == Nothing) $ do
+        when (isNothing over) $ do
           atomically (readTVar deaf >>= check)
           atomically (readTVar low >>= check)
           mapM_ (const yield) [1 .. k `mod` 10]

@@ -1,3 +1,4 @@
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- | Attacks: the stop request of a single branch, which the operator makes itself, while three
@@ -49,7 +50,7 @@ attack =
  where
   count r = atomicModifyIORef' r (\n -> (n + 1, ()))
   waiting n what over =
-    tryTakeMVar over >>= \done -> case done of
+    tryTakeMVar over >>= \case
       Just () -> pure ()
       Nothing
         | n == 0 -> void (broken (what ++ ": the stop request was lost"))
