@@ -25,7 +25,7 @@ attack = do
     program <- getExecutablePath
     n <- getNumCapabilities
     executeFile program False ["LateRecovery", "+RTS", "-C0", "-N" ++ show n] (Just [("ATTACK_AGAIN", "yes")])
-  boxes <- forM [1 .. 3000] $ \k -> do
+  boxes <- forM [1 .. 6000] $ \k -> do
     box <- newEmptyMVar
     box <$ forkIO (one k >>= putMVar box)
   took <- catMaybes <$> mapM takeMVar boxes
@@ -56,7 +56,7 @@ one k = do
         atomically (writeTVar low False)
   _ <- forkIO $ do
     atomically (readTVar deaf >>= check)
-    threadDelay (1000 + 113 * k)
+    threadDelay (1000 + 100 * k)
     getMonotonicTime >>= writeIORef changed
     atomically (writeTVar low True)
   _ <- try (monitor (const <$> watching (readTVar low) <*> polling 0.0005 reading) recovery task) :: IO (Either SomeException ())
