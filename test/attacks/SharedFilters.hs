@@ -20,7 +20,7 @@ import Behavior.Time (atomically)
 attack :: IO ()
 attack = do
   -- The memory of a shared hysteresis outlives each operator, also where nobody looks.
-  replicateM_ 500 $ do
+  replicateM_ 100 $ do
     level <- newTVarIO (50 :: Int)
     ended "hysteresis" $ Signal.withShared (Signal.hysteresis False 20 80 (Signal.watching (readTVar level))) $ \s -> do
       is "at first" s False
@@ -33,7 +33,7 @@ attack = do
       set level 50
       void (allOf [is "kept by all" s False, is "kept by all" s False])
       -- Nobody looks now, but the worker.
-      set level 85 >> sleep 0.002 >> set level 50
+      set level 85 >> sleep 0.05 >> set level 50
       is "seen by nobody but the worker" s True
   putStrLn "hysteresis held"
   -- A sensor that dies, hangs or comes back: heard by all, each time.
