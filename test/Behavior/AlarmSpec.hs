@@ -85,6 +85,10 @@ sleepers = do
           subtract slot <$> getMonotonicTime
         pure (filter (< 0) early === [])
 
+  it "for a slot gives the time at which that begins, and not the one that was asked for" $ do
+    t <- getMonotonicTime
+    sleepToSlot 0.01 t (t + 0.003) `shouldReturn` slotTime 0.01 t (t + 0.003)
+
   it "until an earlier time than all others wakes before them" $
     replicateM_ 3 . eventually $ do
       -- (If the machine has slept too long itself, that says nothing: then once more.)
