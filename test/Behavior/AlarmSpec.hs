@@ -89,6 +89,12 @@ sleepers = do
     t <- getMonotonicTime
     sleepToSlot 0.01 t (t + 0.003) `shouldReturn` slotTime 0.01 t (t + 0.003)
 
+  it "for more than a second does not wake after one" $ do
+    t <- getMonotonicTime
+    -- (As if the sleep had begun earlier: the second is over soon.)
+    sleepBetween (t - 0.999) (t + 0.05)
+    getMonotonicTime >>= (`shouldSatisfy` (>= t + 0.05))
+
   it "until an earlier time than all others wakes before them" $
     replicateM_ 3 . eventually $ do
       -- (If the machine has slept too long itself, that says nothing: then once more.)
