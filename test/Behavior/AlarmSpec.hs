@@ -12,6 +12,7 @@ import Control.Monad (replicateM, replicateM_, void, when)
 import Data.Foldable (for_)
 import Data.List (nub)
 import GHC.Clock (getMonotonicTime)
+import System.CPUTime (getCPUTime)
 import Test.Hspec
 import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
 import Test.QuickCheck hiding (within)
@@ -94,6 +95,15 @@ sleepers = do
     -- (As if the sleep had begun earlier: the second is over soon.)
     sleepBetween (t - 0.999) (t + 0.05)
     getMonotonicTime >>= (`shouldSatisfy` (>= t + 0.05))
+
+  it "for less than a twentieth of a second uses next to no processor time" $ do
+    costs <- replicateM 5 $ do
+      begun <- getCPUTime
+      t <- getMonotonicTime
+      sleepBetween t (t + 0.04)
+      subtract begun <$> getCPUTime
+    let picosecondsInAMillisecond = 1000000000
+    minimum costs `shouldSatisfy` (< 5 * picosecondsInAMillisecond)
 
   it "until an earlier time than all others wakes before them" $
     replicateM_ 3 . eventually $ do
