@@ -136,6 +136,15 @@ sleepers = do
         stillRunning sleeper
         cancel sleeper
 
+  it "for ever does not wake, however long ago it began" $ do
+    t <- getMonotonicTime
+    let aYearAgo = t - 3e7
+    launching (sleepBetween aYearAgo (1 / 0)) $ \sleeper -> do
+      awaitIdle (asyncThreadId sleeper)
+      -- It has waited at the same gates, all of which have opened by now, and at its own.
+      sleepBetween aYearAgo t
+      stillRunning sleeper
+
   for_ [0, -1, -1 / 0] $ \seconds ->
     it ("for " ++ show seconds ++ " s does not wait: nothing can come in between") $ do
       book <- newNotebook
