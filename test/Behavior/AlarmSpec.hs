@@ -190,6 +190,14 @@ many = do
           t' <- getMonotonicTime
           sleepBetween t' (t' + 0.04) >> step
 
+  it "wake by one clock, however many come and go while another sleeps long" $
+    growingByLessThan 20000 400 $ \step -> do
+      begun <- getMonotonicTime
+      launching (sleepBetween begun (1 / 0)) $ \_ ->
+        replicateM_ 400 $ do
+          t <- getMonotonicTime
+          sleepBetween t (t + 0.0005) >> step
+
   -- (Who is interrupted leaves something behind until the gate opens.)
   prop "nobody waits at a gate that is farther away than he has slept, or than a second" $
     forAll ((,) <$> choose (0, maxBound `div` 4) <*> oneof [choose (1, 100000), choose (1, maxBound `div` 4)]) $ \(from, long) ->
