@@ -178,6 +178,7 @@ undefinedExceptions = do
     , ("BehaviorFailed", throwIO (throw (Fault "undefined") :: BehaviorFailed))
     , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed (throw (Fault "undefined") :: Failed)))
     , ("SomeAsyncException", throwIO (throw (Fault "undefined") :: SomeAsyncException))
+    , ("a cancellation inside SomeAsyncException", throwIO (SomeAsyncException (throw (Fault "undefined") :: Cancel)))
     , ("of a type of its own", throwIO (throw (Fault "undefined") :: Fault))
     ]
   several =
