@@ -102,6 +102,9 @@ heard = do
     it ("it is a reading that " ++ manner ++ " when it is compared, which is not lost") $
       minute (Signal.switch (Incomparable e <$> time) (const hang)) `shouldReturn` (show e, 5)
 
+    it ("it is one of a debounced signal that " ++ manner ++ " when it is compared, which is not lost") $
+      minute (Signal.switch (Signal.debounce 1 (Incomparable e <$> time)) (const hang)) `shouldReturn` (show e, 5)
+
     it ("it is a reading of which the function " ++ manner ++ ", which is not lost") $
       minute (Signal.rSelect ((\t -> t < 5 || throw e) <$> time) hang hang) `shouldReturn` (show e, 5)
 
