@@ -108,6 +108,12 @@ heard = do
     it ("it is a reading of which the function " ++ manner ++ ", which is not lost") $
       minute (Signal.rSelect ((\t -> t < 5 || throw e) <$> time) hang hang) `shouldReturn` (show e, 5)
 
+  it "of two readings that cannot be compared the left one counts, when both are found at once" $ do
+    let left = toException (Fault "left")
+        incomparable e = Signal.debounce 1 (Incomparable e <$> time)
+        both' = (,) <$> incomparable left <*> incomparable (toException (Fault "right"))
+    minute (Signal.withShared both' (\s -> sleep 10 >> Signal.switch s (const hang))) `shouldReturn` (show left, 10)
+
 -- | From five on it cannot be compared.
 data Incomparable = Incomparable SomeException Seconds
 
