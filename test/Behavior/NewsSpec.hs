@@ -159,6 +159,10 @@ stale = do
     minute (Signal.waitUntil (Signal.staleAfter 2 (Signal.polling 5 (False <$ sleep 1.5))))
       `shouldReturn` ("goes on", 60)
 
+  for_ ways $ \(way, made) ->
+    it ("fails when a reading hangs " ++ way) $
+      minute (Signal.waitUntil (Signal.staleAfter 2 (made hanging))) `shouldReturn` (tooLong, 7)
+
   for_ [(3, 7), (6, 7), (8, 8)] $ \(asked, noticed') ->
     it ("hears of it on a shared signal, when it hangs since 5 and is asked about at " ++ show asked) $
       minute (Signal.withShared hanging (\s -> sleep asked >> Signal.waitUntil (Signal.staleAfter 2 s)))
@@ -166,3 +170,14 @@ stale = do
  where
   hanging = Signal.polling 1 (now >>= \t -> if t < 5 then pure False else hang)
   tooLong = "FailedBecause \"no reading of the signal within 2.0 s\""
+  ways =
+    [ ("under a function", fmap (&& True))
+    , ("under debounce", Signal.debounce 0.1)
+    , ("under hysteresis", Signal.hysteresis False False True)
+    , ("on the left of one that needs no readings", \s -> (||) <$> s <*> unread)
+    , ("on the right of one that needs no readings", \s -> (||) <$> unread <*> s)
+    , ("on the left of one that is read in time", \s -> (||) <$> s <*> inTime)
+    , ("on the right of one that is read in time", \s -> (||) <$> inTime <*> s)
+    ]
+  unread = Signal.watching (pure False)
+  inTime = Signal.polling 1 (False <$ sleep 0.5)
