@@ -25,6 +25,15 @@ spec :: Spec
 spec = guarded $ do
   describe "hysteresis" hysteresis
   describe "debounce" debounce
+  for_ [("hysteresis", Signal.hysteresis False False True), ("debounce", Signal.debounce 1)] $ \(name, refined) ->
+    it (name ++ " goes on after what its signal throws while no operator reads it") $ do
+      book <- newNotebook
+      dial <- newDial True
+      _ <- simulate . Signal.withShared (refined (watched dial)) $ \signal -> do
+        Signal.switch signal (note book)
+        for_ [SaysFault, Says False] $ \says' -> atomically (writeTVar dial says') >> sleep 2
+        Signal.switch signal (note book)
+      notes book `shouldReturn` [True, False]
 
 hysteresis :: Spec
 hysteresis = do
