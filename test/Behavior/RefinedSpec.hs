@@ -76,24 +76,25 @@ hysteresis = do
       Signal.rSelect (Signal.hysteresis False 10 90 (recorded level)) left (pure "right")
         `shouldReturn` "left"
 
-  it "remembers also what changed nothing for its operator" $ do
-    book <- newNotebook
-    level <- newRecorded (0 :: Int)
-    armed <- newTVarIO False
-    entered <- newGate
-    let signal = (&&) <$> dialled armed <*> Signal.hysteresis False 10 90 (recorded level)
-        cool = note book "cool" >> atomically (writeTVar (underlying level) 10)
-        task = do
-          note book "task"
-          again <- (> 1) . length <$> notes book
-          unless again (open entered >> hang)
-    launching (Signal.monitor signal cool task) $ \caller -> do
-      pass entered
-      atomically (writeTVar (underlying level) 95)
-      noticed level caller 95
-      atomically (writeTVar (underlying level) 50 >> writeTVar armed True)
-      awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["task", "cool", "task"]
+  for_ [("rose", False, 0, 95), ("fell", True, 95, 0)] $ \(manner, initial, start, changed) ->
+    it ("remembers also what " ++ manner ++ " and changed nothing for its operator") $ do
+      book <- newNotebook
+      level <- newRecorded (start :: Int)
+      armed <- newTVarIO False
+      entered <- newGate
+      let signal = (&&) <$> dialled armed <*> ((/= initial) <$> Signal.hysteresis initial 10 90 (recorded level))
+          recovery = note book "recovery" >> atomically (writeTVar (underlying level) start)
+          task = do
+            note book "task"
+            again <- (> 1) . length <$> notes book
+            unless again (open entered >> hang)
+      launching (Signal.monitor signal recovery task) $ \caller -> do
+        pass entered
+        atomically (writeTVar (underlying level) changed)
+        noticed level caller changed
+        atomically (writeTVar (underlying level) 50 >> writeTVar armed True)
+        awaitEnd caller `shouldReturn` Gave ()
+      notes book `shouldReturn` ["task", "recovery", "task"]
 
   it "keeps its memory across recoveries" $ do
     book <- newNotebook
