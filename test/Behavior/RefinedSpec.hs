@@ -169,6 +169,18 @@ debounce = do
       finished run `shouldBe` 0
       notes book `shouldReturn` ["recovery", "task"]
 
+  it "forgets at a recovery a change that had not lasted" $ do
+    book <- newNotebook
+    alarm <- newTVarIO False
+    level <- newTVarIO False
+    let recovery = note book "recovery" >> atomically (writeTVar alarm False >> writeTVar level False)
+        task = note book "task" >> sleep 10
+        changes = for_ [level, alarm] $ \var -> sleep 0.5 >> atomically (writeTVar var True)
+        signal = (||) <$> dialled alarm <*> Signal.debounce 1 (dialled level)
+    run <- simulate (Signal.monitor signal recovery task ||| (changes >> hang))
+    finished run `shouldBe` 11
+    notes book `shouldReturn` ["task", "recovery", "task"]
+
   it "counts a change from when it came last" $ do
     level <- newTVarIO (0 :: Int)
     let flicker = for_ [(1, 1), (0.5, 0), (0.25, 1)] $ \(pause, value) -> sleep pause >> atomically (writeTVar level value)
