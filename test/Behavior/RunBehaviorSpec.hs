@@ -38,7 +38,7 @@ spec = guarded . describe "runBehavior" $ do
     end `shouldBe` Gave (False, Unmasked)
     events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
 
-  for_ [(sigINT, "SIGINT", 130), (sigTERM, "SIGTERM", 143)] $ \(signal, name, code) -> do
+  for_ [(sigINT, sigTERM, "SIGINT", 130), (sigTERM, sigINT, "SIGTERM", 143)] $ \(signal, otherSignal, name, code) -> do
     it ("ends with " ++ show code ++ " after a " ++ name ++ ", when the cleanups have ended") $ do
       notebook <- newNotebook
       cleaning <- newGate
@@ -78,6 +78,11 @@ spec = guarded . describe "runBehavior" $ do
     it ("ends the process at once at a second " ++ name ++ ", even during a cleanup") $
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal signal >> hang)))
         >>= (`shouldBe` Terminated signal False)
+
+    it ("ends the process at once at a signal of the other kind after a " ++ name) $
+      inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal otherSignal >> hang)))
+        >>= (`shouldBe` Terminated otherSignal False)
+
 
     it ("gives a " ++ name ++ " whose handler starts after the end to the handler that was there before") $
       withHandler signal $ \heard -> do
