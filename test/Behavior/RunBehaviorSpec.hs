@@ -83,6 +83,10 @@ spec = guarded . describe "runBehavior" $ do
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal otherSignal >> hang)))
         >>= (`shouldBe` Terminated otherSignal False)
 
+    it ("takes a second " ++ name ++ " that came with the first one for the same") $ do
+      let twice = installed signal >>= \handler -> (handler >> hang) `onException` handler
+      inChild (byDefault signal >> runBehavior twice) >>= (`shouldBe` Exited (ExitFailure code))
+
 
     it ("gives a " ++ name ++ " whose handler starts after the end to the handler that was there before") $
       withHandler signal $ \heard -> do
