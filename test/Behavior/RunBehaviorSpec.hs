@@ -96,6 +96,14 @@ spec = guarded . describe "runBehavior" $ do
           pure end
         ends `shouldContain` [Right 'a' :: Either ExitCode Char]
 
+    it ("ignores a " ++ name ++ " after the end, where it was ignored before") $
+      bracket (installHandler signal Ignore Nothing) (\old -> installHandler signal old Nothing) $ \_ -> do
+        runBehavior (pure ())
+        there <- installHandler signal Ignore Nothing
+        case there of
+          Ignore -> pure ()
+          _ -> expectationFailure "another handler is there"
+
 
     it ("gives a " ++ name ++ " whose handler starts after the end to the handler that was there before") $
       withHandler signal $ \heard -> do
