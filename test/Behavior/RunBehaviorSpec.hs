@@ -104,6 +104,20 @@ spec = guarded . describe "runBehavior" $ do
           Ignore -> pure ()
           _ -> expectationFailure "another handler is there"
 
+    it ("cancels by a " ++ name ++ " what still runs when some have ended that began before and after it") $
+      withHandler signal $ \_ -> do
+        began <- newGate
+        mayEnd <- newGate
+        inside <- newGate
+        launching (runBehavior (open began >> pass mayEnd)) $ \before' -> do
+          pass began
+          launching (runBehavior (open inside >> hang)) $ \caller -> do
+            pass inside
+            open mayEnd
+            wait before'
+            runBehavior (pure ())
+            raiseSignal signal
+            (wait caller :: IO ()) `shouldThrow` (== ExitFailure code)
 
     it ("gives a " ++ name ++ " whose handler starts after the end to the handler that was there before") $
       withHandler signal $ \heard -> do
