@@ -15,11 +15,13 @@ import Data.Maybe (isNothing)
 #if MIN_VERSION_base(4,18,0)
 import GHC.Conc.Sync (threadLabel)
 #endif
-import Test.Hspec
+import Test.Hspec hiding (parallel)
 
-import Behavior (Failed (..), failed)
+import Behavior (Failed (..), both, failed, parallel)
 import Behavior.Internal.Runtime hiding (note)
 import Behavior.Internal.Scope
+import qualified Behavior.Signal as Signal
+import Behavior.Sim (Run (finished), explore, randomly)
 import Support
 
 spec :: Spec
@@ -274,6 +276,20 @@ scopes = do
         open mayEnd
         awaitEnd caller
     (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), [])
+
+  it "lets nothing that arrives while branches stop wait until a handler of the caller's runs" $
+    void . explore (randomly 1000) $ \simulated -> do
+      notebook <- newNotebook
+      let operator = both (sleep 1 >> failed) (sleep 2)
+          handled = operator `catch` \(_ :: Failed) -> allowInterrupt `onException` note notebook "in the handler"
+      _ <- simulated (parallel handled (sleep 1))
+      notes notebook `shouldReturn` []
+
+  it "stops all branches of an operator that is cancelled while it makes its stop requests" $
+    void . explore (randomly 1000) $ \simulated -> do
+      let due = Signal.polling 1 ((>= 1) <$> now)
+      run <- simulated (parallel (Signal.monitor due (pure ()) hang) (sleep 1))
+      finished run `shouldBe` 1
 
 pairs :: Spec
 pairs = do
