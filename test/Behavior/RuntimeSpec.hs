@@ -285,6 +285,22 @@ scopes = do
       _ <- simulated (parallel handled (sleep 1))
       notes notebook `shouldReturn` []
 
+  it "gives a masked caller its verdict, though that is cancelled while branches stop" $ do
+    cleaning <- newGate
+    mayEnd <- newGate
+    (end, done) <- observing $ \notebook -> do
+      let operator = structured $ \scope -> do
+            inside <- newGate
+            _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
+            pass inside
+            pure (pure "verdict")
+      launching (mask_ (operator >>= note notebook) >> hang :: IO ()) $ \caller -> do
+        pass cleaning
+        throwing (asyncThreadId caller) (Cancel "caller")
+        open mayEnd
+        awaitEnd caller
+    (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), ["verdict"])
+
   it "stops all branches of an operator that is cancelled while it makes its stop requests" $
     void . explore (randomly 1000) $ \simulated -> do
       let due = Signal.polling 1 ((>= 1) <$> now)
