@@ -301,6 +301,17 @@ scopes = do
         awaitEnd caller
     (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), ["verdict"])
 
+  for_ [toException BlockedIndefinitelyOnMVar, toException BlockedIndefinitelyOnSTM] $ \deadlock ->
+    it ("throws a branch's fault rather than " ++ show deadlock) $ do
+      inside <- newGate
+      let operator = structured $ \scope -> do
+            _ <- branch scope label ((open inside >> hang) `onException` throwIO (Fault "branch")) :: IO (Branch ())
+            hang :: IO (IO ())
+      launching operator $ \caller -> do
+        pass inside
+        throwing (asyncThreadId caller) deadlock
+        awaitEnd caller `shouldReturn` FaultedWith (show (Fault "branch"))
+
   it "stops all branches of an operator that is cancelled while it makes its stop requests" $
     void . explore (randomly 1000) $ \simulated -> do
       let due = Signal.polling 1 ((>= 1) <$> now)
