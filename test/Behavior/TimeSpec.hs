@@ -51,6 +51,11 @@ lengths = do
     show (0.05 :: Seconds) `shouldBe` "0.05"
     show (3600 :: Seconds) `shouldBe` "3600.0"
     show (Just (-0.5 :: Seconds)) `shouldBe` "Just (-0.5)"
+    map show [5e-324, -5e-324 :: Seconds] `shouldBe` ["5.0e-324", "-5.0e-324"]
+
+  it "have their parentheses where other numbers have them" $
+    for_ [0 .. 11] $ \precedence -> for_ [0.5, -0.5] $ \s ->
+      showsPrec precedence (realToFrac s :: Seconds) "" `shouldBe` showsPrec precedence (s :: Double) ""
 
   it "can be read as they are shown" $
     property $ \(x :: Double) -> let s = realToFrac x :: Seconds in read (show s) === s
