@@ -127,6 +127,11 @@ timeouts = do
     observing (\notebook -> timeout 0 (note notebook 'a'))
       `shouldReturn` (FailedWith (show (TimedOut 0)), "")
 
+  it "does not start it then under any schedule" . void . explore (randomly 100) $ \simulated -> do
+    notebook <- newNotebook
+    _ <- simulated (timeout 0 (note notebook 'a'))
+    notes notebook `shouldReturn` ""
+
   it "returns when the behaviour has ended, however slow its cleanup" $ do
     (end, said) <- observing $ \notebook ->
       virtually $ do
