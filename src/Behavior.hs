@@ -84,7 +84,7 @@
 --
 -- A second exception, or one for a caller that is masked or has been stopped already (as the caller
 -- of a nested operator has, whose outer one was stopped), hangs: @throwTo@ waits for the caller, and
--- that for the cleanup. Have a thread of its own throw it:
+-- that for the cleanup. (A simulation ends there, and names both.) Have a thread of its own throw it:
 --
 -- > parallel drive (steer `finally` forkIO (throwTo me EmergencyStop))
 --

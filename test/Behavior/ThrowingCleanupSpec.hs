@@ -13,6 +13,7 @@ import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, writeTVar)
 import Control.Exception
 import Control.Monad (replicateM_, void)
 import Data.Foldable (for_)
+import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -25,22 +26,26 @@ import Support hiding (End (..))
 spec :: Spec
 spec = guarded $ do
   describe "A cleanup that throws to the operator's caller" fromCleanups
+  describe "A branch that is slow to hear that it is to stop" slowToHear
   describe "Two limits that expire while an operator waits for a cleanup" limits
 
 -- | Each operator, with a first branch that goes on, and what makes it stop that.
-operators :: [(String, Behavior () -> Behavior () -> Behavior ())]
-operators =
+operators, forTwo :: [(String, Behavior () -> Behavior () -> Behavior ())]
+forTwo =
   [ ("parallel", flip parallel)
   , ("parallel, left", parallel)
   , ("both", \act enough -> both act (enough >> failed))
-  , ("firstOf", \act enough -> firstOf [enough, act, hang])
   , ("allOf", \act enough -> void (allOf [act, enough >> failed]))
-  , ("scoped", \act enough -> scoped (\_ -> parallel act enough))
-  , ("whileHolding", \act enough -> condition enough (`Signal.whileHolding` act))
-  , ("monitor", \act enough -> condition enough (\c -> Signal.monitor (not <$> c) (pure ()) act))
-  , ("monitor in parallel", \act enough -> monitor (pure False) (pure ()) act ||| enough)
-  , ("withShared in timeout", \act enough -> timeout 3600 (Signal.withShared (pure ()) (const act) ||| enough))
   ]
+operators =
+  forTwo
+    ++ [ ("firstOf", \act enough -> firstOf [enough, act, hang])
+       , ("scoped", \act enough -> scoped (\_ -> parallel act enough))
+       , ("whileHolding", \act enough -> condition enough (`Signal.whileHolding` act))
+       , ("monitor", \act enough -> condition enough (\c -> Signal.monitor (not <$> c) (pure ()) act))
+       , ("monitor in parallel", \act enough -> monitor (pure False) (pure ()) act ||| enough)
+       , ("withShared in timeout", \act enough -> timeout 3600 (Signal.withShared (pure ()) (const act) ||| enough))
+       ]
  where
   -- A signal that is true until then.
   condition enough body = do
@@ -96,6 +101,20 @@ fromCleanups = do
     mask $ \restore -> do
       atomically (readTVar room >>= writeTVar room . (+ 1))
       restore act `finally` uninterruptibleMask_ (atomically (readTVar room >>= writeTVar room . subtract 1))
+
+-- | Its operator asks it, and is interrupted before it has heard.
+slowToHear :: Spec
+slowToHear =
+  for_ forTwo $ \(name, operator) ->
+    it (name ++ ": hears of it, though the caller was interrupted meanwhile") $ do
+      entered <- newGate
+      mayHear <- newGate
+      end <- launching (operator (uninterruptibleMask_ (open entered >> pass mayHear) >> hang) (pass entered)) $ \caller -> do
+        eventually ((== ThreadBlocked BlockedOnException) <$> threadStatus (asyncThreadId caller))
+        throwing (asyncThreadId caller) (Cancel "the caller")
+        open mayHear
+        awaitEnd caller
+      end `shouldBe` CancelledBy (show (Cancel "the caller"))
 
 -- | As they are with what GHC itself cannot interrupt.
 limits :: Spec

@@ -90,7 +90,7 @@ exploration = do
     reported missions `shouldContain` ["      3  the robot failed: --simulate --seed 1 --schedule 1"]
 
   it "are reported when some come to no end" $ do
-    report <- reported <$> explored 1 (given ["--threshold", "95", "--action", "60"])
+    report <- reported <$> explored 1 (given ["--threshold", "95", "--action", "60", "--charge", "1"])
     report !! 5 `shouldContain` "      1  not over"
  where
   -- Sometimes low on the way, sometimes not.

@@ -169,6 +169,13 @@ mistakes = do
     outside "async" (async (threadDelay 10000000) >>= wait) "use Behavior.Time.atomically, parallel, both, fork"
     outside "race" (void (race (threadDelay 10000000) (threadDelay 10000000))) "use "
     outside "forkIO" (newEmptyMVar >>= \box -> forkIO (threadDelay 10000000 >> putMVar box ()) >> takeMVar box) "forkIO and a wait for it"
+  it "that a cleanup throws to who waits for its end: both are named" $ do
+    run <- simulate $ do
+      me <- myThreadId
+      parallel (sleep 1) (sleep 2 `finally` throwTo me (userError "e-stop"))
+    let text = explain (outcome run)
+    text `shouldContain` "parallel: right waited outside of the simulation, for another thread to hear an exception"
+    text `shouldContain` "\n  main waits for its branches: parallel: right"
   it "that something outside woke somebody" $ do
     flag <- newTVarIO False
     run <- simulate $ do

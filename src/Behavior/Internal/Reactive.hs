@@ -146,7 +146,7 @@ interrupt engine sensors running = \case
  where
   running' = SomeBranch running
   sensors' = map SomeBranch sensors
-  stop branches = ask branches >> ended running
+  stop branches = askToAwait branches >> ended running
 
 -- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
 -- those that are slow to, but what comes after it does.

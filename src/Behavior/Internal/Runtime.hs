@@ -20,6 +20,7 @@ module Behavior.Internal.Runtime
   , start
   , startWith
   , interrupt
+  , interruptDirectly
   , interruptByMessengers
   , living
 
@@ -54,6 +55,7 @@ import Control.Exception
   , Exception (toException)
   , SomeException
   , bracket_
+  , onException
   , try
   , uninterruptibleMask_
   )
@@ -170,6 +172,13 @@ labelling = unsafePerformIO (traced <$> getTraceFlags)
 interrupt :: Exception e => ThreadId -> e -> IO ()
 interrupt thread e =
   inSimulation (throwTo thread e) (\simulation -> deliver simulation thread (toException e))
+
+-- | 'interrupt' for a caller that then waits for the end of the thread. It is not withdrawn: if
+-- the caller is interrupted before the thread has heard, a messenger goes on. Call it masked.
+interruptDirectly :: Exception e => ThreadId -> e -> IO ()
+interruptDirectly thread e =
+  inSimulation (throwTo thread e `onException` interruptByMessengers (const e) [thread]) $ \simulation ->
+    send simulation thread (toException e)
 
 -- | 'interrupt' by messengers, who do the waiting: none of the threads hears it later
 -- because another is slow to hear.

@@ -32,6 +32,7 @@ module Behavior.Internal.Scope
   , worker
   , forget
   , ask
+  , askToAwait
 
     -- * How a branch ends
   , Outcome (..)
@@ -147,24 +148,24 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 end :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
 end (Scope branches) state before = do
   newestFirst <- readIORef branches
-  ask newestFirst
-  fmap reverse <$> foldM withFault (before, []) (reverse newestFirst)
+  (thrown, ()) <- patiently before (askToAwait newestFirst)
+  fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
  where
   withFault (thrown, faults) (SomeBranch b) = do
-    (thrown', o) <- unlessAtAGlance (fmap ((,) thrown) <$> outcomeNow b) (awaiting thrown b)
+    (thrown', o) <- unlessAtAGlance (fmap ((,) thrown) <$> outcomeNow b) (patiently thrown (atomically (outcome b)))
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)
   -- Waits so that it can be interrupted; then so that it cannot.
-  awaiting thrown b = case thrown of
+  patiently thrown waiting = case thrown of
     Nothing | state == Unmasked -> do
-      awaited <- try (atomically (outcome b))
-      case awaited of
-        Right o -> pure (Nothing, o)
+      waited <- try waiting
+      case waited of
+        Right a -> pure (Nothing, a)
         Left e -> do
           deadlocked <- isDeadlock e
-          (,) (if deadlocked then Nothing else Just e) <$> firmly (atomically (outcome b))
-    _ -> (,) thrown <$> firmly (atomically (outcome b))
+          (,) (if deadlocked then Nothing else Just e) <$> firmly waiting
+    _ -> (,) thrown <$> firmly waiting
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
@@ -202,7 +203,19 @@ forget (Scope branches) old = modifyIORef' branches without
 -- another cannot be interrupted just now. It does not wait until they have; so nothing that
 -- interrupts the caller withdraws what it has asked for.
 ask :: [SomeBranch] -> IO ()
-ask branches = mask_ $ foldM asked [] branches >>= interruptByMessengers Stop
+ask branches = mask_ $ unasked branches >>= interruptByMessengers Stop
+
+-- | The same for a caller that then waits for the end of them all. So it can ask a single
+-- branch itself, which costs less.
+askToAwait :: [SomeBranch] -> IO ()
+askToAwait branches = mask_ $
+  unasked branches >>= \case
+    [thread] -> interruptDirectly thread (Stop thread)
+    threads -> interruptByMessengers Stop threads
+
+-- | Those that are still to be asked, which from now on count as asked.
+unasked :: [SomeBranch] -> IO [ThreadId]
+unasked = foldM asked []
  where
   asked threads (SomeBranch b) = do
     needed <- marked b

@@ -57,10 +57,9 @@ polling every act = Signal $ \demand -> do
   let readings stopRequested = do
         t <- now
         slot <- max t <$> readIORef next
-        readFrom slot Unpublished
+        readFrom t slot Unpublished
        where
-        readFrom due published = do
-          t <- now
+        readFrom t due published = do
           slot <- sleepToSlot every t due
           writeIORef next $! slot + every
           when (readingTimes demand) $ atomically (writeTVar inFlight (Just slot))
@@ -82,7 +81,7 @@ polling every act = Signal $ \demand -> do
             when (changed || readingTimes demand) . atomically $ do
               when changed (writeTVar newest (Just (generation, read')))
               when (readingTimes demand) (writeTVar inFlight Nothing)
-            now >>= \t' -> readFrom (slotAfter t' (slot + every)) $! case read' of
+            now >>= \t' -> readFrom t' (slotAfter t' (slot + every)) $! case read' of
               _ | not changed -> published
               Left _ -> Unpublished
               Right new -> Published generation new

@@ -40,22 +40,22 @@ explain = \case
   Failing e -> "it failed: " ++ text e
   Faulting e -> "it faulted: " ++ text e
   Cancelled e -> "it was cancelled: " ++ text e
-  Deadlock waiting ->
-    intercalate "\n  " ("deadlock: every thread waits, and nothing in the simulation will wake one" : map waits waiting)
+  Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
   Livelock labels -> "livelock: the virtual time stands still while these run on and on: " ++ commas labels
   OutOfTime -> "the virtual time has come to the end that was set"
   Outside label' blocked -> show label' ++ " waited outside of the simulation, " ++ instead blocked
   Meddled waiting ->
-    intercalate "\n  " $
+    listed
       "something outside of the simulation changed what these waited for (a thread of forkIO or async? \
       \start it by parallel, both or fork)"
-        : map waits waiting
+      waiting
   TooSlow label' (Seconds t) ->
     show label' ++ " ran when the limit of real time was reached, at " ++ showFFloat (Just 3) t " s of virtual time: \
       \it computes for very long, or for ever (see patience), or the behaviour has no end (see endAt)"
   Misfit why -> "the schedule does not fit this behaviour: " ++ why
- where
-  waits (Waiting who' what') = show who' ++ " waits for " ++ what'
+
+listed :: String -> [Waiting] -> String
+listed title = intercalate "\n  " . (title :) . map (\(Waiting who' what') -> show who' ++ " waits for " ++ what')
 
 instead :: Blocked -> String
 instead = \case
@@ -69,7 +69,11 @@ instead = \case
   InThunk ->
     "for a value that another thread is computing (it was lazy, and to compute it waits, \
     \or takes longer than patience): compute it before, by evaluate"
-  InThrowing -> "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork"
+  InThrowing others ->
+    listed
+      "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork; \
+      \and a cleanup must not throw to who waits for its end"
+      others
   Elsewhere ->
     "for something that this library knows nothing of (threadDelay): \
     \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"

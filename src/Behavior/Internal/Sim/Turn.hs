@@ -7,6 +7,7 @@
 -- thrown to it. Time moves when no task can do anything.
 module Behavior.Internal.Sim.Turn
   ( choose
+  , waitings
   ) where
 
 import Control.Concurrent (threadDelay)
@@ -102,7 +103,7 @@ timeMoves sim = do
           finishing OutOfTime
       | otherwise -> do
           disturbed <- meddled (5 :: Int)
-          who' <- waitings sim
+          who' <- waitings sim (const True)
           finishing (if disturbed then Meddled who' else Deadlock who')
  where
   end = endAt (options sim)
@@ -139,11 +140,11 @@ timeMoves sim = do
           Map.toAscList (Map.takeWhileAntitone (\(t, _) -> t < next + slip (options sim) && t <= end) asleep)
       | otherwise = []
 
--- | Who waits for what.
-waitings :: Sim -> IO [Waiting]
-waitings sim = do
+-- | Who of these tasks waits for what.
+waitings :: Sim -> (Task -> Bool) -> IO [Waiting]
+waitings sim these = do
   alive <- IntMap.elems <$> readIORef (tasks sim)
-  waiting <- traverse (\task -> Waiting (taskLabel task) . reason alive task <$> readIORef (place task)) alive
+  waiting <- traverse (\task -> Waiting (taskLabel task) . reason alive task <$> readIORef (place task)) (filter these alive)
   (waiting ++) . concat <$> traverse sent alive
  where
   sent target = do

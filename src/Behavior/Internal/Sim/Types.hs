@@ -135,8 +135,9 @@ data Blocked
     InMVar
   | -- | A transaction: @retry@ in @Control.Concurrent.STM.atomically@, the waits of @async@.
     InTransaction
-  | -- | Another thread that was thrown to: @throwTo@, @killThread@, @cancel@.
-    InThrowing
+  | -- | Another thread that was thrown to (@throwTo@, @killThread@, @cancel@), and what the
+    -- others waited for meanwhile.
+    InThrowing [Waiting]
   | -- | A value that another thread was computing, up to 'patience'.
     InThunk
   | -- | Anything else.

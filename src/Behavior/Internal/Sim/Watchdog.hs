@@ -25,6 +25,7 @@ import System.Posix.Unistd (usleep)
 
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.State
+import Behavior.Internal.Sim.Turn (waitings)
 import Behavior.Internal.Sim.Types
 
 -- | The simulations to look after. The watchdog holds on to them: so GHC does not take
@@ -99,10 +100,13 @@ look sim before = do
           let computes = TooSlow (taskLabel runner) came
           tell sight (if status == ThreadBlocked BlockedOnBlackHole then Outside (taskLabel runner) InThunk else computes)
       | n == atPoint sight, Just how <- blocked status -> do
-          let seen = sight {waits = waits sight + 1}
+          attended <- isAttended sim n
+          let seen = if attended then sight {waits = waits sight + 1} else sight
           -- Whoever was to be unwound, and waits elsewhere for it, is left behind.
           when (waits seen >= 400) (void (tryPutMVar (back sim) ()))
-          if waits seen < 100 then pure seen else tell seen (Outside (taskLabel runner) how)
+          if waits seen < 100
+            then pure seen
+            else waitings sim ((/= taskNumber runner) . taskNumber) >>= tell seen . Outside (taskLabel runner) . how
       | otherwise -> pure sight {atPoint = n, waits = 0}
  where
   Seconds allowed = patience (options sim)
@@ -110,14 +114,23 @@ look sim before = do
     unless (told sight) (void (tryPutMVar (over sim) (Just verdict)))
     pure sight {told = True}
 
--- | In what a thread waits. (Foreign calls are allowed, and to wait for what another thread
--- computes: that ends by itself, or else runs into the limit of real time.)
-blocked :: ThreadStatus -> Maybe Blocked
+-- | Whether the simulation's capability has run something since it came to this point. If not,
+-- the operating system is late with it, perhaps just while the turn is handed on.
+isAttended :: Sim -> Int -> IO Bool
+isAttended sim n = do
+  attended <- (== n) <$> readIORef (attendedAt sim)
+  unless attended . void . forkOn (capability sim) $ writeIORef (attendedAt sim) n
+  pure attended
+
+-- | In what a thread waits, while the others wait for what is given. (Foreign calls are
+-- allowed, and to wait for what another thread computes: that ends by itself, or else runs into
+-- the limit of real time.)
+blocked :: ThreadStatus -> Maybe ([Waiting] -> Blocked)
 blocked (ThreadBlocked reason) = case reason of
-  BlockedOnMVar -> Just InMVar
-  BlockedOnSTM -> Just InTransaction
+  BlockedOnMVar -> Just (const InMVar)
+  BlockedOnSTM -> Just (const InTransaction)
   BlockedOnException -> Just InThrowing
-  BlockedOnOther -> Just Elsewhere
+  BlockedOnOther -> Just (const Elsewhere)
   _ -> Nothing
 blocked _ = Nothing
 
