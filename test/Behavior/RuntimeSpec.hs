@@ -312,11 +312,12 @@ scopes = do
         throwing (asyncThreadId caller) deadlock
         awaitEnd caller `shouldReturn` FaultedWith (show (Fault "branch"))
 
-  it "stops all branches of an operator that is cancelled while it makes its stop requests" $
-    void . explore (randomly 1000) $ \simulated -> do
-      let due = Signal.polling 1 ((>= 1) <$> now)
-      run <- simulated (parallel (Signal.monitor due (pure ()) hang) (sleep 1))
-      finished run `shouldBe` 1
+  for_ [("interrupts", 1), ("recovers first", 0)] $ \(manner, start') ->
+    it ("stops all threads of a monitor that " ++ manner ++ " and is cancelled while it makes its stop requests") $
+      void . explore (randomly 1000) $ \simulated -> do
+        let due = Signal.polling 1 ((>= start') <$> now)
+        run <- simulated (parallel (Signal.monitor ((&&) <$> due <*> due) (pure ()) hang) (sleep start'))
+        finished run `shouldBe` start'
 
 pairs :: Spec
 pairs = do
