@@ -74,6 +74,15 @@
 -- What must not be cut in two, the last step of @deliver@ and the record of it, is put under one
 -- 'Control.Exception.mask_'.
 --
+-- == Cleanups that take time
+--
+-- @finally@, @bracket@ and @onException@ run a cleanup masked. What waits in it ('sleep', a transaction
+-- that retries) can be interrupted all the same: by a stop request, when the behaviour had ended by
+-- itself and was cleaning up already. The rest of the cleanup is then skipped, and the recovery
+-- starts. A cleanup that must be finished is made uninterruptible; whatever stops it waits:
+--
+-- > (extend arm >> takePicture) `finally` uninterruptibleMask_ (park arm)
+--
 -- == What GHC limits
 --
 -- An operator waits for the cleanups of its branches, and what is thrown at its caller meanwhile is

@@ -27,6 +27,7 @@ import qualified Behavior.StormSpec
 import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
 import qualified Examples.DoorBatterySpec
+import qualified Examples.GreenhouseRoverSpec
 import qualified Examples.ProgressProblemSpec
 import qualified Examples.TestingARobotSpec
 import qualified Paper.DoorsSpec
@@ -97,5 +98,6 @@ main = hspec $ do
     Paper.ErrataSpec.spec
   describe "Examples" $ do
     describe "door-battery" Examples.DoorBatterySpec.spec
+    describe "greenhouse-rover" Examples.GreenhouseRoverSpec.spec
     describe "progress-problem" Examples.ProgressProblemSpec.spec
     describe "testing-a-robot" Examples.TestingARobotSpec.spec

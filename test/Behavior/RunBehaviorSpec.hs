@@ -165,6 +165,10 @@ spec = guarded . describe "runBehavior" $ do
         )
         >>= (`shouldBe` Exited (ExitFailure 7))
 
+    it ("leaves a " ++ name ++ " alone in a process that the behaviour has forked, where nothing of it runs") $ do
+      runBehavior (inChild (raiseSignal signal >> hang)) >>= (`shouldBe` Terminated signal False)
+      runBehavior (inChild (runBehavior (raiseSignal signal >> hang))) >>= (`shouldBe` Exited (ExitFailure code))
+
     it ("makes it the exit code of the process after a " ++ name) $
       inChild (runBehavior (raiseSignal signal >> hang))
         >>= (`shouldBe` Exited (ExitFailure code))

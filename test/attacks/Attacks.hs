@@ -6,14 +6,19 @@ import System.Exit (die)
 
 import qualified DeadCleanup
 import qualified IndirectThrow
+import qualified LateRecovery
+import qualified MutualThrow
 import qualified NestedLimits
 import qualified NurseryRaces
 import qualified ReactiveThrow
+import qualified SimBusy
 import qualified SimEnds
 import qualified SharedFilters
 import qualified SimGhc
+import qualified SimReality
 import qualified StuckMasked
 import qualified SlowStops
+import qualified StopsOnce
 import qualified Storm
 import qualified StuckLimits
 import qualified UndefinedOutside
@@ -30,14 +35,19 @@ main = do
 attacks :: [(String, IO ())]
 attacks =
   [ ("DeadCleanup", DeadCleanup.attack)
+  , ("LateRecovery", LateRecovery.attack)
+  , ("MutualThrow", MutualThrow.attack)
   , ("NestedLimits", NestedLimits.attack)
   , ("NurseryRaces", NurseryRaces.attack)
   , ("ReactiveThrow", ReactiveThrow.attack)
+  , ("SimBusy", SimBusy.attack)
   , ("SimEnds", SimEnds.attack)
   , ("SharedFilters", SharedFilters.attack)
   , ("SimGhc", SimGhc.attack)
+  , ("SimReality", SimReality.attack)
   , ("StuckMasked", StuckMasked.attack)
   , ("SlowStops", SlowStops.attack)
+  , ("StopsOnce", StopsOnce.attack)
   , ("Storm", Storm.attack)
   , ("StuckLimits", StuckLimits.attack)
   , ("UndefinedOutside", UndefinedOutside.attack)

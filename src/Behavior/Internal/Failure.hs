@@ -86,7 +86,7 @@ type Behavior = IO
 -- >>> throwIO DoorLocked ? putStrLn "take the window"
 -- take the window
 --
--- >>> throwIO DoorLocked `catch` \DoorLocked -> putStrLn "fetch the key"
+-- >>> try (throwIO DoorLocked) >>= either (\DoorLocked -> putStrLn "fetch the key") pure
 -- fetch the key
 --
 -- /Section 5 of the paper./

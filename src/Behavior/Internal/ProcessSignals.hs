@@ -31,14 +31,16 @@ import Control.Concurrent.MVar (MVar, modifyMVar, modifyMVar_, newMVar)
 import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Concurrent.STM.TVar (mkWeakTVar)
 import Control.Exception (bracket, uninterruptibleMask_)
-import Control.Monad (void)
+import Control.Monad (void, (>=>))
 import Data.Foldable (for_)
 import Data.Maybe (catMaybes)
 import Data.Traversable (for)
 import System.IO.Unsafe (unsafePerformIO)
 import System.Mem.StableName (eqStableName, makeStableName)
 import System.Mem.Weak (Weak, deRefWeak)
+import System.Posix.Process (getProcessID)
 import System.Posix.Signals (Handler (..), Signal, installHandler, raiseSignal, sigINT, sigTERM)
+import System.Posix.Types (ProcessID)
 
 import Behavior.Internal.Runtime (atomically)
 
@@ -71,6 +73,8 @@ data Process = Process
   -- ^ What the runs have received, unless one has taken it.
   , defaulted :: Bool
   -- ^ Whether the first signal has come: the next ends the process at once.
+  , owner :: Maybe ProcessID
+  -- ^ Whose runs these are.
   }
 
 process :: MVar Process
@@ -78,7 +82,13 @@ process = unsafePerformIO (newMVar nothingRuns)
 {-# NOINLINE process #-}
 
 nothingRuns :: Process
-nothingRuns = Process {runs = [], before = [], pending = Nothing, defaulted = False}
+nothingRuns = Process {runs = [], before = [], pending = Nothing, defaulted = False, owner = Nothing}
+
+-- | What runs here. (In a process that was made by @forkProcess@ nothing of the first one's does.)
+here :: Process -> IO Process
+here known = do
+  self <- getProcessID
+  pure (if owner known == Just self then known else nothingRuns {owner = Just self})
 
 -- | A run begins. (One that begins while others are being stopped belongs to a cleanup; the
 -- second signal ends it with them.)
@@ -86,18 +96,18 @@ enter :: IO (Int, TVar State)
 enter = do
   state <- newTVarIO Undisturbed
   weakly <- mkWeakTVar state (pure ())
-  modifyMVar process $ \known -> do
-    installed <- if null (runs known) then install else pure known
+  modifyMVar process $ here >=> \known -> do
+    installed <- if null (runs known) then install known else pure known
     let n = 1 + maximum (0 : map fst (runs installed))
     pure (installed {runs = (n, weakly) : runs installed}, (n, state))
  where
-  install = do
+  install known = do
     old <- for handlers $ \(signal, handler) -> do
       handlerBefore <- installHandler signal handler Nothing
       -- (C)
       stayed <- isOurs signal handlerBefore
       pure (signal, if stayed then Default else handlerBefore)
-    pure nothingRuns {before = old}
+    pure known {before = old}
 
 -- | A run has ended.
 leave :: (Int, TVar State) -> IO ()
@@ -114,7 +124,7 @@ leave (n, state) = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
 
 -- | What is done at a signal.
 received :: Signal -> IO ()
-received signal = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
+received signal = uninterruptibleMask_ . modifyMVar_ process $ here >=> \known -> do
   there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
   case there of
     -- (B)

@@ -32,7 +32,8 @@ import Behavior.Internal.Scope
 -- is thrown in that thread: the behaviour is cancelled, and the process goes on. When
 -- @main@ returns, the process ends and no cleanup of other threads runs. Signals belong to
 -- the whole process: where several behaviours run so, one inside the other or side by side,
--- a signal cancels all of them.
+-- a signal cancels all of them. In a process made by @forkProcess@ none of them runs, and
+-- nothing wakes that sleeps there: fork before.
 --
 -- An action that needs a bound thread can have one by
 -- 'Control.Concurrent.runInBoundThread', but then nothing interrupts it: a stop request

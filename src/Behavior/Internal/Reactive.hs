@@ -126,17 +126,17 @@ follow engine sensors seen = \case
 interrupt :: Eq k => Engine k a -> Sensors -> Branch a -> Interruption a -> IO (IO a)
 interrupt engine sensors running = \case
   Finish verdict ->
-    stop (running' : sensors') >>= \case
+    stop sensors' >>= \case
       Stopped _ -> pure verdict
       end -> pure (settle end)
   Recover name recovery ->
-    stop (running' : sensors') >>= \case
+    stop sensors' >>= \case
       Completed a -> pure (pure a)
       Stopped _ -> forget (scope engine) running >> recover engine sensors name recovery Nothing
       -- A cleanup that went wrong must not keep the robot from its charger.
       wrong -> recover engine sensors name recovery (Just (settle wrong))
   Reselect ->
-    stop [running'] >>= \case
+    stop [] >>= \case
       -- Read again: by now the value may be another, or the old one again.
       Stopped _ -> do
         forget (scope engine) running
@@ -144,9 +144,9 @@ interrupt engine sensors running = \case
         select engine sensors seen Reread
       end -> pure (settle end)
  where
-  running' = SomeBranch running
   sensors' = map SomeBranch sensors
-  stop branches = askToAwait branches >> ended running
+  -- It waits for the branch, but not for the others.
+  stop others = ask others >> askToAwait [SomeBranch running] >> ended running
 
 -- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
 -- those that are slow to, but what comes after it does.

@@ -205,8 +205,8 @@ forget (Scope branches) old = modifyIORef' branches without
 ask :: [SomeBranch] -> IO ()
 ask branches = mask_ $ unasked branches >>= interruptByMessengers Stop
 
--- | The same for a caller that then waits for the end of them all. So it can ask a single
--- branch itself, which costs less.
+-- | The same for a caller that then waits for the end of them all, and can wait here, too: it
+-- asks a single branch itself, which costs less.
 askToAwait :: [SomeBranch] -> IO ()
 askToAwait branches = mask_ $
   unasked branches >>= \case

@@ -18,7 +18,7 @@ import Numeric (showFFloat)
 --
 -- @since 0.1.0.0
 newtype Seconds = Seconds Double
-  deriving (Eq, Ord, Num, Fractional, Real, RealFrac)
+  deriving (Eq, Ord, Enum, Num, Fractional, Real, RealFrac)
 
 instance Show Seconds where
   -- 0.05, and not 5.0e-2; but 5.0e-324

@@ -161,9 +161,9 @@ data Worker = Worker
 -- | The value that a transaction gives: event-driven. It reacts to the very
 -- transaction that changes the value, and costs nothing while nothing changes.
 --
--- While the transaction retries at first, the operator waits for a value. If it
--- retries later the signal has no value any more, and the operator fails. What the
--- transaction throws, the operator throws.
+-- While the transaction retries at first, the operator waits for a value (limit that by
+-- 'Behavior.Time.timeout', if it may never come). If it retries later the signal has no
+-- value any more, and the operator fails. What the transaction throws, the operator throws.
 --
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar)
 -- >>> battery <- newTVarIO (5 :: Int)
@@ -180,9 +180,10 @@ watching transaction = Signal . const . pure . viewing . pure $ View transaction
 -- > withShared s body  ~  body s     but with one thread a sensor, not one an occurrence
 --
 -- The sensors are read for as long as the behaviour runs, and are asked to stop
--- together with it: a cleanup must not wait for them. All that the behaviour throws is
--- thrown. Outside it the shared signal is closed: to open it there is a
--- fault, an 'ErrorCall'.
+-- together with it: a cleanup must not wait for them. An operator in there decides on a
+-- reading that began after the operator did, and so waits for the next slot, up to a period.
+-- All that the behaviour throws is thrown. Outside it the shared signal is closed: to open
+-- it there is a fault, an 'ErrorCall'.
 --
 -- >>> import Data.IORef
 -- >>> count <- newIORef (0 :: Int)

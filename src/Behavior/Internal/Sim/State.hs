@@ -88,8 +88,8 @@ data Sim = Sim
   -- ^ The driver gets the turn back.
   , strikes :: !(IORef Int)
   -- ^ How many operations the task that is being unwound has tried.
-  , attendedAt :: !(IORef Int)
-  -- ^ The point at which the watchdog last knew that the capability runs.
+  , attended :: !(IORef Bool)
+  -- ^ Whether the capability has run what the watchdog put into its queue last.
   }
 
 -- | A simulated thread; or a messenger, which has no thread and only throws.
@@ -178,7 +178,7 @@ newSim o p = do
     <*> newIORef False
     <*> newEmptyMVar
     <*> newIORef 0
-    <*> newIORef (-1)
+    <*> newIORef True
 
 -- | For so many points one task may go on in the undisturbed schedule.
 turns :: Int

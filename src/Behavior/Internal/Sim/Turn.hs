@@ -10,7 +10,6 @@ module Behavior.Internal.Sim.Turn
   , waitings
   ) where
 
-import Control.Concurrent (threadDelay)
 import Control.Monad (void, when)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
@@ -20,6 +19,7 @@ import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Enabled
+import Behavior.Internal.Sim.OsSleep
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State
@@ -120,7 +120,7 @@ timeMoves sim = do
   meddled n = do
     committed sim
     able <- enabled sim
-    if Map.null able then threadDelay 1000 >> meddled (n - 1) else pure True
+    if Map.null able then osSleep 1000 >> meddled (n - 1) else pure True
 
   -- How far it moves: to the next moment at which a sleeper is due, or to a later one, as
   -- long as none is late by 'slip'.

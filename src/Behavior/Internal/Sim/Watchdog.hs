@@ -20,10 +20,10 @@ import System.IO.Unsafe (unsafePerformIO)
 #if !defined(mingw32_HOST_OS)
 import System.IO (hFlush, hPutStrLn, stderr)
 import System.Posix.Signals (raiseSignal, sigKILL)
-import System.Posix.Unistd (usleep)
 #endif
 
 import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Sim.OsSleep
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn (waitings)
 import Behavior.Internal.Sim.Types
@@ -63,7 +63,7 @@ data Sight = Sight
 -- | Looks every few milliseconds, for as long as there is something to look after.
 patrol :: Map Int Sight -> Int -> IO ()
 patrol seen idle = do
-  doze
+  osSleep 5000
   (sims, _) <- readIORef kennel
   if Map.null sims && idle > 20
     then do
@@ -72,16 +72,6 @@ patrol seen idle = do
     else do
       sights <- Map.traverseWithKey (\n sim -> look sim (Map.lookup n seen)) sims
       patrol sights $! if Map.null sims then idle + 1 else 0 -- a thunk would keep them
-
--- | Sleeps for five milliseconds. With the threaded runtime in the operating system:
--- 'threadDelay' needs a thread of the runtime's own, which may never get its turn while
--- somebody keeps its capability busy.
-doze :: IO ()
-#if defined(mingw32_HOST_OS)
-doze = threadDelay 5000
-#else
-doze = if rtsSupportsBoundThreads then usleep 5000 else threadDelay 5000
-#endif
 
 look :: Sim -> Maybe Sight -> IO Sight
 look sim before = do
@@ -100,8 +90,8 @@ look sim before = do
           let computes = TooSlow (taskLabel runner) came
           tell sight (if status == ThreadBlocked BlockedOnBlackHole then Outside (taskLabel runner) InThunk else computes)
       | n == atPoint sight, Just how <- blocked status -> do
-          attended <- isAttended sim n
-          let seen = if attended then sight {waits = waits sight + 1} else sight
+          ran <- isAttended sim
+          let seen = if ran then sight {waits = waits sight + 1} else sight
           -- Whoever was to be unwound, and waits elsewhere for it, is left behind.
           when (waits seen >= 400) (void (tryPutMVar (back sim) ()))
           if waits seen < 100
@@ -114,13 +104,15 @@ look sim before = do
     unless (told sight) (void (tryPutMVar (over sim) (Just verdict)))
     pure sight {told = True}
 
--- | Whether the simulation's capability has run something since it came to this point. If not,
--- the operating system is late with it, perhaps just while the turn is handed on.
-isAttended :: Sim -> Int -> IO Bool
-isAttended sim n = do
-  attended <- (== n) <$> readIORef (attendedAt sim)
-  unless attended . void . forkOn (capability sim) $ writeIORef (attendedAt sim) n
-  pure attended
+-- | Whether the simulation's capability has run what was put at the end of its queue when this
+-- was asked last. If not, the machine is late, perhaps just while the turn is handed on.
+isAttended :: Sim -> IO Bool
+isAttended sim = do
+  ran <- readIORef (attended sim)
+  when ran $ do
+    writeIORef (attended sim) False
+    void . mask_ $ forkOn (capability sim) (writeIORef (attended sim) True)
+  pure ran
 
 -- | In what a thread waits, while the others wait for what is given. (Foreign calls are
 -- allowed, and to wait for what another thread computes: that ends by itself, or else runs into

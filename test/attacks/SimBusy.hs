@@ -1,0 +1,46 @@
+{-# LANGUAGE BangPatterns #-}
+
+-- | Attacks: simulated runs that end in a deadlock, while another thread computes and does not allocate.
+-- Must come out: each is reported as the deadlock that it is, and not as a wait outside of the simulation.
+module SimBusy (attack) where
+
+import Control.Concurrent
+import Control.Concurrent.STM (check, newTVarIO, readTVar)
+import Control.Exception (evaluate)
+import Control.Monad (forM_, unless, void)
+import Data.IORef
+import GHC.Clock (getMonotonicTime)
+
+import Attack
+import Behavior.Sim
+import Behavior.STM (atomically)
+
+attack :: IO ()
+attack = do
+  before <- getMonotonicTime
+  _ <- evaluate (computed 100000000 1)
+  after <- getMonotonicTime
+  over <- newIORef False
+  let computing = do
+        _ <- evaluate (computed (round (0.8 * 100000000 / (after - before))) 1)
+        yield
+        isOver <- readIORef over
+        unless isOver computing
+  done <- newEmptyMVar
+  -- On one capability: where there is another, the watchdog is there.
+  void . forkOn 0 $ do
+    void (forkOn 0 computing)
+    forM_ [1 .. 3 :: Int] $ \k -> do
+      never <- newTVarIO False
+      run <- simulate (atomically (readTVar never >>= check))
+      case outcome run of
+        Deadlock _ -> pure ()
+        other -> broken ("run " ++ show k ++ ": " ++ explain other)
+    writeIORef over True
+    putMVar done ()
+  takeMVar done
+
+computed :: Int -> Int -> Int
+computed 0 !sofar = sofar
+computed n !sofar = computed (n - 1) (sofar * 3 + n)
+{-# NOINLINE computed #-}
