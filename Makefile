@@ -1,4 +1,4 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals reality attacks ci clean
+.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals reality attacks mutants ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -18,6 +18,7 @@ help:
 	@echo 'make signals   SIGINT and SIGTERM at 1,000 random moments each (MOMENTS=100 for fewer)'
 	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
 	@echo 'make attacks   programs that try to break the promises (NAMES="Storm" selects)'
+	@echo 'make mutants   small mistakes in the sources, which the tests must notice (NAMES="debounce" selects)'
 	@echo 'make clean     remove what was built'
 
 demo:
@@ -50,6 +51,9 @@ reality:
 
 attacks:
 	@.ci/attacks $(NAMES)
+
+mutants:
+	@.ci/mutants $(NAMES)
 
 ci:
 	@.ci/run

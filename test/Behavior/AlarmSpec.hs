@@ -12,6 +12,7 @@ import Control.Monad (replicateM, replicateM_, void, when)
 import Data.Foldable (for_)
 import Data.List (nub)
 import GHC.Clock (getMonotonicTime)
+import System.CPUTime (getCPUTime)
 import Test.Hspec
 import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
 import Test.QuickCheck hiding (within)
@@ -85,6 +86,25 @@ sleepers = do
           subtract slot <$> getMonotonicTime
         pure (filter (< 0) early === [])
 
+  it "for a slot gives the time at which that begins, and not the one that was asked for" $ do
+    t <- getMonotonicTime
+    sleepToSlot 0.01 t (t + 0.003) `shouldReturn` slotTime 0.01 t (t + 0.003)
+
+  it "for more than a second does not wake after one" $ do
+    t <- getMonotonicTime
+    -- (As if the sleep had begun earlier: the second is over soon.)
+    sleepBetween (t - 0.999) (t + 0.05)
+    getMonotonicTime >>= (`shouldSatisfy` (>= t + 0.05))
+
+  it "for less than a twentieth of a second uses next to no processor time" $ do
+    costs <- replicateM 5 $ do
+      begun <- getCPUTime
+      t <- getMonotonicTime
+      sleepBetween t (t + 0.04)
+      subtract begun <$> getCPUTime
+    let picosecondsInAMillisecond = 1000000000
+    minimum costs `shouldSatisfy` (< 5 * picosecondsInAMillisecond)
+
   it "until an earlier time than all others wakes before them" $
     replicateM_ 3 . eventually $ do
       -- (If the machine has slept too long itself, that says nothing: then once more.)
@@ -115,6 +135,15 @@ sleepers = do
         awaitIdle (asyncThreadId sleeper)
         stillRunning sleeper
         cancel sleeper
+
+  it "for ever does not wake, however long ago it began" $ do
+    t <- getMonotonicTime
+    let aYearAgo = t - 3e7
+    launching (sleepBetween aYearAgo (1 / 0)) $ \sleeper -> do
+      awaitIdle (asyncThreadId sleeper)
+      -- It has waited at the same gates, all of which have opened by now, and at its own.
+      sleepBetween aYearAgo t
+      stillRunning sleeper
 
   for_ [0, -1, -1 / 0] $ \seconds ->
     it ("for " ++ show seconds ++ " s does not wait: nothing can come in between") $ do
@@ -160,6 +189,14 @@ many = do
         replicateM_ 9 $ do
           t' <- getMonotonicTime
           sleepBetween t' (t' + 0.04) >> step
+
+  it "wake by one clock, however many come and go while another sleeps long" $
+    growingByLessThan 20000 400 $ \step -> do
+      begun <- getMonotonicTime
+      launching (sleepBetween begun (1 / 0)) $ \_ ->
+        replicateM_ 400 $ do
+          t <- getMonotonicTime
+          sleepBetween t (t + 0.0005) >> step
 
   -- (Who is interrupted leaves something behind until the gate opens.)
   prop "nobody waits at a gate that is farther away than he has slept, or than a second" $

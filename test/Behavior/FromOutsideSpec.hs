@@ -169,14 +169,16 @@ undefinedExceptions = do
         awaitEnd caller
       end `shouldBe` (FaultedWith (show (Fault "undefined")) :: Ending ())
       notes book `shouldReturn` ["recovered"]
-  it "that another undefined exception is made of: the same" $
-    beside (throwIO (throw (throw (Fault "undefined") :: SomeException) :: SomeException)) parallel
+  it "that other undefined exceptions are made of: the same" $
+    for_ (take 3 (iterate throw (throw (Fault "undefined") :: SomeException))) $ \bottom ->
+      beside (throwIO bottom) parallel
  where
   exceptions =
     [ ("SomeException", throwIO (throw (Fault "undefined") :: SomeException))
     , ("BehaviorFailed", throwIO (throw (Fault "undefined") :: BehaviorFailed))
     , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed (throw (Fault "undefined") :: Failed)))
     , ("SomeAsyncException", throwIO (throw (Fault "undefined") :: SomeAsyncException))
+    , ("a cancellation inside SomeAsyncException", throwIO (SomeAsyncException (throw (Fault "undefined") :: Cancel)))
     , ("of a type of its own", throwIO (throw (Fault "undefined") :: Fault))
     ]
   several =

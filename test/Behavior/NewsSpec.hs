@@ -102,8 +102,17 @@ heard = do
     it ("it is a reading that " ++ manner ++ " when it is compared, which is not lost") $
       minute (Signal.switch (Incomparable e <$> time) (const hang)) `shouldReturn` (show e, 5)
 
+    it ("it is one of a debounced signal that " ++ manner ++ " when it is compared, which is not lost") $
+      minute (Signal.switch (Signal.debounce 1 (Incomparable e <$> time)) (const hang)) `shouldReturn` (show e, 5)
+
     it ("it is a reading of which the function " ++ manner ++ ", which is not lost") $
       minute (Signal.rSelect ((\t -> t < 5 || throw e) <$> time) hang hang) `shouldReturn` (show e, 5)
+
+  it "of two readings that cannot be compared the left one counts, when both are found at once" $ do
+    let left = toException (Fault "left")
+        incomparable e = Signal.debounce 1 (Incomparable e <$> time)
+        both' = (,) <$> incomparable left <*> incomparable (toException (Fault "right"))
+    minute (Signal.withShared both' (\s -> sleep 10 >> Signal.switch s (const hang))) `shouldReturn` (show left, 10)
 
 -- | From five on it cannot be compared.
 data Incomparable = Incomparable SomeException Seconds
@@ -150,6 +159,10 @@ stale = do
     minute (Signal.waitUntil (Signal.staleAfter 2 (Signal.polling 5 (False <$ sleep 1.5))))
       `shouldReturn` ("goes on", 60)
 
+  for_ ways $ \(way, made) ->
+    it ("fails when a reading hangs " ++ way) $
+      minute (Signal.waitUntil (Signal.staleAfter 2 (made hanging))) `shouldReturn` (tooLong, 7)
+
   for_ [(3, 7), (6, 7), (8, 8)] $ \(asked, noticed') ->
     it ("hears of it on a shared signal, when it hangs since 5 and is asked about at " ++ show asked) $
       minute (Signal.withShared hanging (\s -> sleep asked >> Signal.waitUntil (Signal.staleAfter 2 s)))
@@ -157,3 +170,14 @@ stale = do
  where
   hanging = Signal.polling 1 (now >>= \t -> if t < 5 then pure False else hang)
   tooLong = "FailedBecause \"no reading of the signal within 2.0 s\""
+  ways =
+    [ ("under a function", fmap (&& True))
+    , ("under debounce", Signal.debounce 0.1)
+    , ("under hysteresis", Signal.hysteresis False False True)
+    , ("on the left of one that needs no readings", \s -> (||) <$> s <*> unread)
+    , ("on the right of one that needs no readings", \s -> (||) <$> unread <*> s)
+    , ("on the left of one that is read in time", \s -> (||) <$> s <*> inTime)
+    , ("on the right of one that is read in time", \s -> (||) <$> inTime <*> s)
+    ]
+  unread = Signal.watching (pure False)
+  inTime = Signal.polling 1 (False <$ sleep 0.5)

@@ -89,6 +89,15 @@ slots = do
       pure (n == 4)
     notes moments `shouldReturn` [0, 2, 8, 10]
 
+  it "a reading that was stopped has used up its slot" $ do
+    moments <- newNotebook
+    alarm <- newTVarIO False
+    let reading = now >>= note moments >> sleep 3
+        signal = const <$> dialled alarm <*> Signal.polling 10 reading
+        change = sleep 11 >> atomically (writeTVar alarm True) >> hang
+    _ <- simulate (Signal.monitor signal (atomically (writeTVar alarm False)) (sleep 15) ||| change)
+    notes moments `shouldReturn` [0, 10, 20, 30]
+
   it "readings start a period apart also when a branch is switched each time" $ do
     times <- newNotebook
     level <- timed times (\n -> pure (if n > 50 then -1 else n))

@@ -25,6 +25,15 @@ spec :: Spec
 spec = guarded $ do
   describe "hysteresis" hysteresis
   describe "debounce" debounce
+  for_ [("hysteresis", Signal.hysteresis False False True), ("debounce", Signal.debounce 1)] $ \(name, refined) ->
+    it (name ++ " goes on after what its signal throws while no operator reads it") $ do
+      book <- newNotebook
+      dial <- newDial True
+      _ <- simulate . Signal.withShared (refined (watched dial)) $ \signal -> do
+        Signal.switch signal (note book)
+        for_ [SaysFault, Says False] $ \says' -> atomically (writeTVar dial says') >> sleep 2
+        Signal.switch signal (note book)
+      notes book `shouldReturn` [True, False]
 
 hysteresis :: Spec
 hysteresis = do
@@ -67,24 +76,25 @@ hysteresis = do
       Signal.rSelect (Signal.hysteresis False 10 90 (recorded level)) left (pure "right")
         `shouldReturn` "left"
 
-  it "remembers also what changed nothing for its operator" $ do
-    book <- newNotebook
-    level <- newRecorded (0 :: Int)
-    armed <- newTVarIO False
-    entered <- newGate
-    let signal = (&&) <$> dialled armed <*> Signal.hysteresis False 10 90 (recorded level)
-        cool = note book "cool" >> atomically (writeTVar (underlying level) 10)
-        task = do
-          note book "task"
-          again <- (> 1) . length <$> notes book
-          unless again (open entered >> hang)
-    launching (Signal.monitor signal cool task) $ \caller -> do
-      pass entered
-      atomically (writeTVar (underlying level) 95)
-      noticed level caller 95
-      atomically (writeTVar (underlying level) 50 >> writeTVar armed True)
-      awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["task", "cool", "task"]
+  for_ [("rose", False, 0, 95), ("fell", True, 95, 0)] $ \(manner, initial, start, changed) ->
+    it ("remembers also what " ++ manner ++ " and changed nothing for its operator") $ do
+      book <- newNotebook
+      level <- newRecorded (start :: Int)
+      armed <- newTVarIO False
+      entered <- newGate
+      let signal = (&&) <$> dialled armed <*> ((/= initial) <$> Signal.hysteresis initial 10 90 (recorded level))
+          recovery = note book "recovery" >> atomically (writeTVar (underlying level) start)
+          task = do
+            note book "task"
+            again <- (> 1) . length <$> notes book
+            unless again (open entered >> hang)
+      launching (Signal.monitor signal recovery task) $ \caller -> do
+        pass entered
+        atomically (writeTVar (underlying level) changed)
+        noticed level caller changed
+        atomically (writeTVar (underlying level) 50 >> writeTVar armed True)
+        awaitEnd caller `shouldReturn` Gave ()
+      notes book `shouldReturn` ["task", "recovery", "task"]
 
   it "keeps its memory across recoveries" $ do
     book <- newNotebook
@@ -158,6 +168,18 @@ debounce = do
       run <- simulated (Signal.monitor (Signal.debounce 1 (dialled level)) recovery (note book "task"))
       finished run `shouldBe` 0
       notes book `shouldReturn` ["recovery", "task"]
+
+  it "forgets at a recovery a change that had not lasted" $ do
+    book <- newNotebook
+    alarm <- newTVarIO False
+    level <- newTVarIO False
+    let recovery = note book "recovery" >> atomically (writeTVar alarm False >> writeTVar level False)
+        task = note book "task" >> sleep 10
+        changes = for_ [level, alarm] $ \var -> sleep 0.5 >> atomically (writeTVar var True)
+        signal = (||) <$> dialled alarm <*> Signal.debounce 1 (dialled level)
+    run <- simulate (Signal.monitor signal recovery task ||| (changes >> hang))
+    finished run `shouldBe` 11
+    notes book `shouldReturn` ["task", "recovery", "task"]
 
   it "counts a change from when it came last" $ do
     level <- newTVarIO (0 :: Int)

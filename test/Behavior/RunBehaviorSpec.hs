@@ -9,7 +9,7 @@ module Behavior.RunBehaviorSpec (spec) where
 import Control.Concurrent
 import Control.Concurrent.Async (asyncThreadId, poll, wait, waitCatchSTM, withAsyncBound)
 import Control.Exception
-import Control.Monad (join, replicateM_, void, when)
+import Control.Monad (join, replicateM, replicateM_, void, when)
 import Data.Either (fromLeft)
 import Data.Foldable (for_)
 import Data.Maybe (isNothing)
@@ -38,7 +38,7 @@ spec = guarded . describe "runBehavior" $ do
     end `shouldBe` Gave (False, Unmasked)
     events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
 
-  for_ [(sigINT, "SIGINT", 130), (sigTERM, "SIGTERM", 143)] $ \(signal, name, code) -> do
+  for_ [(sigINT, sigTERM, "SIGINT", 130), (sigTERM, sigINT, "SIGTERM", 143)] $ \(signal, otherSignal, name, code) -> do
     it ("ends with " ++ show code ++ " after a " ++ name ++ ", when the cleanups have ended") $ do
       notebook <- newNotebook
       cleaning <- newGate
@@ -78,6 +78,46 @@ spec = guarded . describe "runBehavior" $ do
     it ("ends the process at once at a second " ++ name ++ ", even during a cleanup") $
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal signal >> hang)))
         >>= (`shouldBe` Terminated signal False)
+
+    it ("ends the process at once at a signal of the other kind after a " ++ name) $
+      inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal otherSignal >> hang)))
+        >>= (`shouldBe` Terminated otherSignal False)
+
+    it ("takes a second " ++ name ++ " that came with the first one for the same") $ do
+      let twice = installed signal >>= \handler -> (handler >> hang) `onException` handler
+      inChild (byDefault signal >> runBehavior twice) >>= (`shouldBe` Exited (ExitFailure code))
+
+    it ("gives a result that is there, though a " ++ name ++ " came before it") $
+      withHandler signal $ \heard -> do
+        -- (Not always: with two capabilities the signal may be seen before there is a result.)
+        ends <- replicateM 100 $ do
+          end <- try (runBehavior ('a' <$ join (installed signal)))
+          either (const (pure ())) (const (takeMVar heard)) end
+          pure end
+        ends `shouldContain` [Right 'a' :: Either ExitCode Char]
+
+    it ("ignores a " ++ name ++ " after the end, where it was ignored before") $
+      bracket (installHandler signal Ignore Nothing) (\old -> installHandler signal old Nothing) $ \_ -> do
+        runBehavior (pure ())
+        there <- installHandler signal Ignore Nothing
+        case there of
+          Ignore -> pure ()
+          _ -> expectationFailure "another handler is there"
+
+    it ("cancels by a " ++ name ++ " what still runs when some have ended that began before and after it") $
+      withHandler signal $ \_ -> do
+        began <- newGate
+        mayEnd <- newGate
+        inside <- newGate
+        launching (runBehavior (open began >> pass mayEnd)) $ \before' -> do
+          pass began
+          launching (runBehavior (open inside >> hang)) $ \caller -> do
+            pass inside
+            open mayEnd
+            wait before'
+            runBehavior (pure ())
+            raiseSignal signal
+            (wait caller :: IO ()) `shouldThrow` (== ExitFailure code)
 
     it ("gives a " ++ name ++ " whose handler starts after the end to the handler that was there before") $
       withHandler signal $ \heard -> do

@@ -15,11 +15,13 @@ import Data.Maybe (isNothing)
 #if MIN_VERSION_base(4,18,0)
 import GHC.Conc.Sync (threadLabel)
 #endif
-import Test.Hspec
+import Test.Hspec hiding (parallel)
 
-import Behavior (Failed (..), failed)
+import Behavior (Failed (..), both, failed, parallel)
 import Behavior.Internal.Runtime hiding (note)
 import Behavior.Internal.Scope
+import qualified Behavior.Signal as Signal
+import Behavior.Sim (Run (finished), explore, randomly)
 import Support
 
 spec :: Spec
@@ -274,6 +276,48 @@ scopes = do
         open mayEnd
         awaitEnd caller
     (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), [])
+
+  it "lets nothing that arrives while branches stop wait until a handler of the caller's runs" $
+    void . explore (randomly 1000) $ \simulated -> do
+      notebook <- newNotebook
+      let operator = both (sleep 1 >> failed) (sleep 2)
+          handled = operator `catch` \(_ :: Failed) -> allowInterrupt `onException` note notebook "in the handler"
+      _ <- simulated (parallel handled (sleep 1))
+      notes notebook `shouldReturn` []
+
+  it "gives a masked caller its verdict, though that is cancelled while branches stop" $ do
+    cleaning <- newGate
+    mayEnd <- newGate
+    (end, done) <- observing $ \notebook -> do
+      let operator = structured $ \scope -> do
+            inside <- newGate
+            _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
+            pass inside
+            pure (pure "verdict")
+      launching (mask_ (operator >>= note notebook) >> hang :: IO ()) $ \caller -> do
+        pass cleaning
+        throwing (asyncThreadId caller) (Cancel "caller")
+        open mayEnd
+        awaitEnd caller
+    (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), ["verdict"])
+
+  for_ [toException BlockedIndefinitelyOnMVar, toException BlockedIndefinitelyOnSTM] $ \deadlock ->
+    it ("throws a branch's fault rather than " ++ show deadlock) $ do
+      inside <- newGate
+      let operator = structured $ \scope -> do
+            _ <- branch scope label ((open inside >> hang) `onException` throwIO (Fault "branch")) :: IO (Branch ())
+            hang :: IO (IO ())
+      launching operator $ \caller -> do
+        pass inside
+        throwing (asyncThreadId caller) deadlock
+        awaitEnd caller `shouldReturn` FaultedWith (show (Fault "branch"))
+
+  for_ [("interrupts", 1), ("recovers first", 0)] $ \(manner, start') ->
+    it ("stops all threads of a monitor that " ++ manner ++ " and is cancelled while it makes its stop requests") $
+      void . explore (randomly 1000) $ \simulated -> do
+        let due = Signal.polling 1 ((>= start') <$> now)
+        run <- simulated (parallel (Signal.monitor ((&&) <$> due <*> due) (pure ()) hang) (sleep start'))
+        finished run `shouldBe` start'
 
 pairs :: Spec
 pairs = do

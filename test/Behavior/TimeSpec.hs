@@ -6,8 +6,9 @@ import Control.Concurrent (myThreadId)
 import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception
-import Control.Monad (replicateM)
+import Control.Monad (replicateM, void, when)
 import Data.Foldable (for_)
+import Data.IORef (newIORef, readIORef, writeIORef)
 import Data.List (sort)
 import qualified System.Timeout as System
 import Test.Hspec
@@ -16,7 +17,7 @@ import Test.QuickCheck hiding (Failure, within)
 import Behavior
 import Behavior.Internal.Runtime (Event (..), Label (..), reportingTo, sleepUntil)
 import Behavior.Internal.Seconds (duration, period)
-import Behavior.Sim (Outcome (..), Run (outcome), explain, simulate)
+import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, simulate)
 import Behavior.Time
 import Support
 
@@ -51,6 +52,11 @@ lengths = do
     show (0.05 :: Seconds) `shouldBe` "0.05"
     show (3600 :: Seconds) `shouldBe` "3600.0"
     show (Just (-0.5 :: Seconds)) `shouldBe` "Just (-0.5)"
+    map show [5e-324, -5e-324 :: Seconds] `shouldBe` ["5.0e-324", "-5.0e-324"]
+
+  it "have their parentheses where other numbers have them" $
+    for_ [0 .. 11] $ \precedence -> for_ [0.5, -0.5] $ \s ->
+      showsPrec precedence (realToFrac s :: Seconds) "" `shouldBe` showsPrec precedence (s :: Double) ""
 
   it "can be read as they are shown" $
     property $ \(x :: Double) -> let s = realToFrac x :: Seconds in read (show s) === s
@@ -76,6 +82,14 @@ sleeping :: Spec
 sleeping = do
   it "returns at once for zero seconds, even under uninterruptibleMask" $
     uninterruptibleMask_ (sleep 0)
+
+  it "for zero seconds lets no other thread run in between, in a simulation" $
+    void . explore (randomly 100) $ \simulated -> do
+      written <- newIORef ""
+      found <- newIORef ""
+      let left = writeIORef written "left" >> sleep 0 >> readIORef written >>= writeIORef found
+      _ <- simulated (both left (writeIORef written "right"))
+      readIORef found `shouldReturn` "left"
 
   it "takes at least as long as it was told to" $
     for_ [0.0001, 0.001, 0.003] $ \s -> do
@@ -113,6 +127,11 @@ timeouts = do
     observing (\notebook -> timeout 0 (note notebook 'a'))
       `shouldReturn` (FailedWith (show (TimedOut 0)), "")
 
+  it "does not start it then under any schedule" . void . explore (randomly 100) $ \simulated -> do
+    notebook <- newNotebook
+    _ <- simulated (timeout 0 (note notebook 'a'))
+    notes notebook `shouldReturn` ""
+
   it "returns when the behaviour has ended, however slow its cleanup" $ do
     (end, said) <- observing $ \notebook ->
       virtually $ do
@@ -148,6 +167,16 @@ timeouts = do
   it "counts from when it is run, each time" $ do
     let limited = timeout 0.001
     virtually ((limited hang ? pure ()) >> limited (pure 'a')) `shouldReturn` 'a'
+
+  it "counts from when it is called, however late its clock starts" $
+    eventually $ do
+      begun <- now
+      let timeIsUp = (>= begun + 0.02) <$> now
+          startingLate event = when (event == Started (Label "timeout" "clock")) (eventually timeIsUp)
+      reportingTo startingLate (timeout 0.02 hang) `shouldThrow` (== TimedOut 0.02)
+      ended <- now
+      -- (If the machine was too slow, that says nothing: then once more.)
+      pure (ended < begun + 0.04)
 
   it "sees what is written in the transactions that it waits for" $ do
     var <- newTVarIO 'a'
