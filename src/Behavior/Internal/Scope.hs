@@ -262,10 +262,12 @@ classified = \case
   Right a -> pure (Completed a)
   Left e -> do
     self <- myThreadId
-    try (evaluate (kind self (forced e))) >>= either (fmap Faulted . defined) pure
+    try (evaluate (kind self e)) >>= either (fmap Faulted . defined) pure
  where
   kind self e
     | isStopOf self e = Stopped e
+    | otherwise = kindOfOther self (forced e)
+  kindOfOther self e
     | Just (StoppedWithFault cause fault) <- fromException e, isStopOf self cause = Faulted $! forced fault
     | isFailure e = Failing e
     | otherwise = Faulted e

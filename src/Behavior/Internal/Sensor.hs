@@ -92,7 +92,7 @@ polling every act = Signal $ \demand -> do
         | otherwise = slot + every * fromInteger (ceiling ((t - slot) / every))
   pure
     Source
-      { workers = [Worker "polling" (readings <$ writeTVar inFlight Nothing)]
+      { workers = [Worker "polling" (readings <$ when (readingTimes demand) (writeTVar inFlight Nothing))]
       , view = do
           n <- (+ 1) <$> readTVar views
           writeTVar views n
