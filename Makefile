@@ -7,7 +7,7 @@ help:
 	@echo 'make warnings  build everything with warnings as errors'
 	@echo 'make doctest   run the examples in the documentation'
 	@echo 'make readme    run the program in README.md'
-	@echo 'make lint      hlint'
+	@echo 'make lint      hlint, and whether the mutants fit the sources'
 	@echo 'make docs      the documentation, which must cover every export'
 	@echo 'make check     what cabal has to say about the package'
 	@echo 'make matrix    demo and test in clean Debian systems (SUITES="bookworm" selects)'

@@ -66,9 +66,10 @@
 -- * Computing takes no time, and timers are exact, unless 'slip' says otherwise.
 -- * Clocks, random numbers and finalizers of your own are as they are.
 --
--- A loop that never allocates can be stopped by nobody. The process is killed after
--- 'patience' and five seconds, if there is a second capability to notice it (@+RTS -N2@); or
--- compile it with @-fno-omit-yields@, and the run ends with 'TooSlow'.
+-- A loop that never allocates can be stopped by nobody: the process hangs, as it would without
+-- a simulation. (With a second capability, @+RTS -N2@, a line on @stderr@ names the thread,
+-- five seconds after 'patience' has run out.) Compile it with @-fno-omit-yields@, and the run
+-- ends with 'TooSlow'.
 --
 -- (Schedules are fastest with one capability and large enough stacks: @+RTS -N1 -ki2k@.)
 module Behavior.Sim

@@ -184,20 +184,21 @@ interruptDirectly thread e =
 -- because another is slow to hear.
 --
 -- One messenger does all the errands, until it has to wait. Then there is another for those
--- that are left.
+-- that are left; at most one for each errand.
 interruptByMessengers :: Exception e => (ThreadId -> e) -> [ThreadId] -> IO ()
 interruptByMessengers what errands =
   inSimulation byMessenger $ \simulation -> for_ errands $ \thread -> send simulation thread (toException (what thread))
  where
-  byMessenger = newIORef errands >>= hire
-  hire left =
+  byMessenger = newIORef errands >>= hire errands
+  hire [] _ = pure ()
+  hire (_ : others) left =
     readIORef left >>= \case
       [] -> pure ()
       _ -> do
         messenger <- forkIO (uninterruptibleMask_ (carry left))
         when labelling $ labelThread messenger (show (Label "interrupt" "messenger"))
         yield
-        hire left
+        hire others left
   carry left =
     atomicModifyIORef'_ left (drop 1) >>= \case
       ([], _) -> pure ()

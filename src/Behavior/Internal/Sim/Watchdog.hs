@@ -1,5 +1,3 @@
-{-# LANGUAGE CPP #-}
-
 -- |
 -- Looks after the simulations that run, by real time: a thread that waits outside of this
 -- library, or never gives the turn back, would halt everything.
@@ -15,12 +13,8 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import GHC.Clock (getMonotonicTime)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
-import System.IO.Unsafe (unsafePerformIO)
-
-#if !defined(mingw32_HOST_OS)
 import System.IO (hFlush, hPutStrLn, stderr)
-import System.Posix.Signals (raiseSignal, sigKILL)
-#endif
+import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.OsSleep
@@ -58,6 +52,8 @@ data Sight = Sight
   -- ^ When it was first seen at all.
   , told :: !Bool
   -- ^ Whether its run was ended for that.
+  , warned :: !Bool
+  -- ^ Whether it was said that this did not help.
   }
 
 -- | Looks every few milliseconds, for as long as there is something to look after.
@@ -80,15 +76,16 @@ look sim before = do
   status <- maybe (pure ThreadFinished) threadStatus (taskThread runner)
   t <- getMonotonicTime
   case before of
-    Nothing -> pure (Sight n 0 t False)
+    Nothing -> pure (Sight n 0 t False False)
     Just sight
       | t - since sight > allowed -> do
-          -- Nothing more can be done with one that does not even hear that it should
-          -- stop, not even a regular exit.
-          when (t - since sight > allowed + 5) (giveUp runner)
           came <- readIORef (time sim)
-          let computes = TooSlow (taskLabel runner) came
-          tell sight (if status == ThreadBlocked BlockedOnBlackHole then Outside (taskLabel runner) InThunk else computes)
+          let verdict
+                | status == ThreadBlocked BlockedOnBlackHole = Outside (taskLabel runner) InThunk
+                | otherwise = TooSlow (taskLabel runner) came
+              hopeless = t - since sight > allowed + 5
+          when (hopeless && not (warned sight)) (warn runner)
+          tell sight {warned = hopeless} verdict
       | n == atPoint sight, Just how <- blocked status -> do
           ran <- isAttended sim
           let seen = if ran then sight {waits = waits sight + 1} else sight
@@ -126,14 +123,11 @@ blocked (ThreadBlocked reason) = case reason of
   _ -> Nothing
 blocked _ = Nothing
 
--- | Kills the process, with a message.
-giveUp :: Task -> IO ()
-#if defined(mingw32_HOST_OS)
-giveUp _ = pure ()
-#else
-giveUp runner = do
-  hPutStrLn stderr ("simulate: " ++ show (taskLabel runner) ++ " cannot be stopped")
+-- | Says why the process hangs, perhaps: one that does not allocate does not hear that it should
+-- stop, and GHC's next garbage collection waits for it.
+warn :: Task -> IO ()
+warn runner = do
+  hPutStrLn stderr $
+    "simulate: " ++ show (taskLabel runner) ++ " does not hear that it should stop. Does it compute without allocating? "
+      ++ "Then compile its module with -fno-omit-yields."
   hFlush stderr
-  -- A regular exit would wait for it.
-  raiseSignal sigKILL
-#endif
