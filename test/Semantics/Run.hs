@@ -14,6 +14,7 @@ import Control.Exception
   , SomeException
   , asyncExceptionFromException
   , asyncExceptionToException
+  , evaluate
   , mask
   , mask_
   , onException
@@ -90,7 +91,7 @@ observing simulated world = do
   let record = recorded (Sim.steps run) told
       seen e = Right Seen {timeline = record, end = e}
       gave = seen . Gave (ticks (finished run))
-  pure $ case outcome run of
+  inFull $ case outcome run of
     Sim.Returned value -> gave (Succeeded value)
     Sim.Failing e -> gave (thrown e)
     Sim.Faulting e -> gave (thrown e)
@@ -103,6 +104,8 @@ observing simulated world = do
     Sim.TooSlow who _ -> Left ("too slow: " ++ show who)
     Sim.Misfit why -> Left ("misfit: " ++ why)
  where
+  -- (Otherwise it would keep the whole run.)
+  inFull whole = whole <$ evaluate (whole == whole)
   ticks = round
   recorded (s : others) events = case (did s, events) of
     (Says _, event : later) -> (ticks (at s), event) : recorded others later
