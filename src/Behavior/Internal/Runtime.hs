@@ -184,7 +184,7 @@ interruptDirectly thread e =
 -- because another is slow to hear.
 --
 -- One messenger does all the errands, until it has to wait. Then there is another for those
--- that are left; at most one for each errand.
+-- that are left: at most as many as there are threads to interrupt.
 interruptByMessengers :: Exception e => (ThreadId -> e) -> [ThreadId] -> IO ()
 interruptByMessengers what errands =
   inSimulation byMessenger $ \simulation -> for_ errands $ \thread -> send simulation thread (toException (what thread))
