@@ -82,7 +82,7 @@ stoppedAtItsLevel stage l (Levels these) = do
         Around InSelect -> L.rSelect l (pure False) hang act
         Around InTask -> L.monitor l (pure False) hang act
         Around InHolding -> L.whileHolding l (pure True) act
-        Around InTimeout -> L.timeout l (1000 * tick stage) act
+        Around InTimeout -> L.timeout l (fromIntegral untilStopped * tick stage) act
         Around InAttempt -> L.attempt l 3 act
         Around InFailing -> L.failing l act
         Around InScope -> L.beside l [hang] act

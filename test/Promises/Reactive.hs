@@ -83,7 +83,7 @@ notTakenForFalse stage l (Death operator sensor cause fromTheStart act) = do
       signal = case sensor of
         Event -> watching reading
         Poll n -> L.polling l (fromIntegral n * tick stage) (atomically reading)
-      branch = perform stage (atomically (writeTVar inside True)) (pure ()) act {takes = 1000, deaf = False}
+      branch = perform stage (atomically (writeTVar inside True)) (pure ()) act {takes = untilStopped, deaf = False}
       other = 0 <$ enter others ()
       operating = case operator of
         Selecting True -> L.rSelect l signal branch other

@@ -16,6 +16,7 @@ module Promises.Stage
     -- * The stage
   , Stage (..)
   , pause
+  , untilStopped
   , calling
   , Deed (..)
   , stopsIt
@@ -107,6 +108,10 @@ pause :: Stage -> Int -> Behavior ()
 pause stage n
   | n <= 0 = checkpoint
   | otherwise = sleep (fromIntegral n * tick stage)
+
+-- | So many ticks that it does not come to its end: three hours where a tick is the shortest.
+untilStopped :: Int
+untilStopped = 1000000000
 
 -- | What is done to a behaviour from outside.
 data Deed world

@@ -347,7 +347,9 @@ operators =
       first <- newGate
       gate <- newGate
       book <- newNotebook
-      t <- thread "operator" (parallel (pass first) (uninterruptibleMask_ (pass gate) >> note book "goes on"))
+      inside <- newGate
+      t <- thread "operator" (parallel (pass first) (masked inside gate >> note book "goes on"))
+      pass inside
       open first
       untilQuiet t
       open gate
@@ -356,7 +358,9 @@ operators =
   , Fixed "that waits for a loser is cancelled when that has ended" "threw a" $ do
       first <- newGate
       gate <- newGate
-      t <- thread "operator" (firstOf [Plain "1" <$ pass first, Plain "2" <$ uninterruptibleMask_ (pass gate)])
+      inside <- newGate
+      t <- thread "operator" (firstOf [Plain "1" <$ pass first, Plain "2" <$ masked inside gate])
+      pass inside
       open first
       untilQuiet t
       a <- throwsTo t "a"
@@ -375,14 +379,19 @@ operators =
   asked further = do
     holds <- newTVarIO True
     gate <- newGate
+    inside <- newGate
     t <-
       thread "operator" $
-        Signal.whileHolding (watching (readTVar holds)) (uninterruptibleMask_ (pass gate) >> further (Plain "done"))
+        Signal.whileHolding (watching (readTVar holds)) (masked inside gate >> further (Plain "done"))
           ? pure (Plain "stopped")
+    pass inside
     atomically (writeTVar holds False)
     untilQuiet t
     open gate
     endOf t
+
+  -- Cannot be interrupted once the first gate is open.
+  masked inside gate = uninterruptibleMask_ (open inside >> pass gate)
 
 -- | Shown without quotation marks.
 newtype Plain = Plain String
