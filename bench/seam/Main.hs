@@ -1,6 +1,6 @@
 -- |
 -- What the operators cost: a line for nanoseconds, and one for allocated bytes. It is
--- built twice, with the seam's switch and without, and told which it is.
+-- built twice, with the switch in the seam and without, and its argument says which it is.
 module Main (main) where
 
 import Control.Concurrent (runInUnboundThread)

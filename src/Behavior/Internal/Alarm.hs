@@ -1,3 +1,5 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Waking at a given time, for many sleepers and without a timer for each.
 --
@@ -11,6 +13,8 @@
 --
 -- (A process that was made by @forkProcess@ while another thread slept has that one's
 -- clock, but nobody who keeps it: there nothing wakes.)
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Alarm
   ( sleepBetween
   , sleepToSlot

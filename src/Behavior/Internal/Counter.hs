@@ -1,6 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- What there is in this process, counted. Many threads change a number at once, and to read
 -- one takes a single instruction.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Counter
   ( Counter
   , add

@@ -1,3 +1,4 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE ExistentialQuantification #-}
 {-# LANGUAGE LambdaCase #-}
 
@@ -17,6 +18,8 @@
 -- +--------------+------------------------------------------+------------------------+
 -- | fault        | every other exception                    | never                  |
 -- +--------------+------------------------------------------+------------------------+
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Failure
   ( Behavior
 

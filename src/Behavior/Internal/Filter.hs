@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
 -- Signals that do not follow every flicker.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Filter
   ( debounce
   , hysteresis

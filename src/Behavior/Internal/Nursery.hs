@@ -1,8 +1,11 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE ExistentialQuantification #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- Behaviours that run beside a scoped one.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Nursery
   ( -- * Scoped behaviours
     Nursery

@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- Several behaviours at once.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Parallel
   ( -- * Two
     parallel

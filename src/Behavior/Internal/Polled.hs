@@ -1,6 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- The paper's reactive operators: those of "Behavior.Internal.Reactive", on a
 -- condition that is polled.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Polled
   ( rSelect
   , monitor

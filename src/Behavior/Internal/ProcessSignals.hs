@@ -1,3 +1,4 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE CPP #-}
 {-# LANGUAGE LambdaCase #-}
 
@@ -16,6 +17,8 @@
 -- (C) A signal whose handler GHC has yet to call is dropped when that handler is replaced by
 --     the default. So where the default was before, this handler stays, and (B) is what it
 --     does.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.ProcessSignals
   ( withSignals
   ) where

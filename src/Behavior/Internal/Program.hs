@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- The life of a program.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Program
   ( runBehavior
   ) where

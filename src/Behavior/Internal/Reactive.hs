@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- The reactive engine, and the operators that are a few lines on it.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Reactive
   ( -- * The engine
     Reaction (..)

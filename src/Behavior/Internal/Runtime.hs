@@ -1,3 +1,4 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE CPP #-}
 {-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE RankNTypes #-}
@@ -10,6 +11,8 @@
 --
 -- Each operation is done in reality, or in the simulation that the calling thread
 -- is part of ("Behavior.Internal.Seam").
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime
   ( -- * Threads
     Label (..)

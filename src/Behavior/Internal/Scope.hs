@@ -1,3 +1,4 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE ExistentialQuantification #-}
 {-# LANGUAGE LambdaCase #-}
 
@@ -15,6 +16,8 @@
 --
 -- Users' code runs in branches, or where an operator catches what it throws. So an exception
 -- that reaches 'structured' was thrown at the caller from outside, whatever its type.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Scope
   ( -- * Scopes
     Scope

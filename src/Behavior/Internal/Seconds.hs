@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE GeneralizedNewtypeDeriving #-}
 
 -- |
 -- Lengths of time, and moments.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Seconds
   ( Seconds (..)
 

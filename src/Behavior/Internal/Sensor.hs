@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- Sensors that must be asked.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sensor
   ( polling
   , staleAfter

@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE RankNTypes #-}
 
 -- |
 -- What the two sides of the seam speak of, and what a simulation does for its threads.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Simulator
   ( Label (..)
   , Event (..)

@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- What a signal is made of.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Source
   ( -- * Signals
     Signal (..)

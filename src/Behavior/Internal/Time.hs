@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- Limits of time.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Time
   ( timeout
   , TimedOut (..)

@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Scripted actions and sensors.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Action
   ( action
   , actionOn

@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Claims about what has happened in a mock world.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Claim
   ( Claim
   , eventually

@@ -1,7 +1,11 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Scripted conditions. No thread of its own changes one: whoever looks at it first
 -- makes the changes that are due, and who watches it wakes for each. So no thread
 -- outlives the operator that watches.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Condition
   ( Condition
   , condition

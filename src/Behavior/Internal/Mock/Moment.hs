@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- What can be pointed at in a record: moments, and what goes on for a while.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Moment
   ( Lines
   , numbered

@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- What has happened in a mock world, line by line.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Record
   ( Record (..)
   , Entry (..)

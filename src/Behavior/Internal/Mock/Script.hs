@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE DeriveFunctor #-}
 
 -- |
 -- What a scripted action does when it is called once.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Script
   ( Script (..)
   , Stopping (..)

@@ -1,9 +1,13 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- A mock world, and the record of what happens there.
 --
 -- To note something is no operation of the seam, but to ask for the time is. So what
 -- is noted right after the time was asked for, and what is done right after that, is
 -- one step of a simulation.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.World
   ( Mock
   , newMock

@@ -1,3 +1,4 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
@@ -6,6 +7,8 @@
 -- Every task that has not ended, but for the one that has the turn, is in at most one of
 -- three places: 'ready', 'awaiting', 'sleepers'. It is in none of them while it waits for
 -- what it has thrown to be raised. So a choice does not have to look at all tasks.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Enabled
   ( file
   , unfile

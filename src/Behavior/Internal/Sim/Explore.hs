@@ -1,8 +1,11 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE BangPatterns #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- Many schedules of one behaviour.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Explore
   ( explore
   , exploring

@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE CPP #-}
 
 -- |
 -- To sleep while GHC's own threads may be kept from running.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.OsSleep
   ( osSleep
   ) where

@@ -1,3 +1,5 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Exceptions that are thrown from one task to another, and raised where GHC raises them.
 --
@@ -6,6 +8,8 @@
 -- blocked in a real 'throwTo'. So GHC raises it, at the very unmask, and in GHC's order.
 -- The helper is on the same capability, where GHC wakes it as it raises the exception: to
 -- look at the helper's state, which no other thread changes meanwhile, is no race.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Pending
   ( throwAt
   , withdraw

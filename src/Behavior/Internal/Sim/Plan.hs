@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- What to explore, and what comes of it.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Plan
   ( Plan (..)
   , Search (..)

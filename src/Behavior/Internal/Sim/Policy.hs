@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Which thread runs when several could.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Policy
   ( Policy (..)
   , Decision (..)

@@ -1,3 +1,5 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- How schedules begin that a search has yet to try.
 --
@@ -5,6 +7,8 @@
 -- in the queue is lazy: a thunk would keep the threads of that run. A decision costs about
 -- 20 words there, however many threads were enabled, and the decisions of one run share the
 -- beginning of its schedule.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Prefix
   ( -- * Prefixes
     Prefix

@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
 -- What came of a simulation, in words.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Report
   ( explain
   , narrate

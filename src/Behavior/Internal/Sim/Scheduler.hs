@@ -1,3 +1,4 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE RankNTypes #-}
 {-# LANGUAGE ScopedTypeVariables #-}
@@ -9,6 +10,8 @@
 --
 -- What is thrown to a task it raises in the place of its operation, if it can receive it
 -- there; otherwise GHC does, when it unmasks ("Behavior.Internal.Sim.Pending").
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Scheduler
   ( simulation
   , launch

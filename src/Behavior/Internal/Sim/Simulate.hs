@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- A simulated run, from its beginning to its end.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Simulate
   ( simulate
   , simulateWith

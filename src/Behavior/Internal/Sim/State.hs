@@ -1,9 +1,13 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- What a simulation is made of.
 --
 -- Each simulated thread is a real one, a 'Task', that runs only while it has the turn
 -- and otherwise waits at a gate of its own. Only who has the turn touches the state of the
 -- simulation, so that needs no locks.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.State
   ( -- * Simulations
     Sim (..)

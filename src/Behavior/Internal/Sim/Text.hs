@@ -1,5 +1,9 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- The text of what a user has written.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Text
   ( legible
   ) where

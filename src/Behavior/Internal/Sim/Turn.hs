@@ -1,3 +1,4 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
 
 -- |
@@ -5,6 +6,8 @@
 --
 -- A task can use the turn if its next operation can be done, or if it receives what was
 -- thrown to it. Time moves when no task can do anything.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Turn
   ( choose
   , waitings

@@ -1,7 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE DeriveFunctor #-}
 
 -- |
 -- What goes into a simulation, and what comes out of it.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Types
   ( -- * What goes in
     Options (..)

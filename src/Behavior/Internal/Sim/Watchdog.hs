@@ -1,6 +1,10 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Looks after the simulations that run, by real time: a thread that waits outside of this
 -- library, or never gives the turn back, would halt everything.
+--
+-- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Watchdog
   ( watched
   ) where
