@@ -45,7 +45,7 @@ speed = do
   (_, day) <- timed (simulate aDay)
   line "a simulated day" day
  where
-  tireless = defaults {standstill = maxBound}
+  tireless = defaults {livelockLimit = maxBound}
   scheduledBy seed = simulateWith defaults {scheduled = Seeded seed} mission
   aDay = Signal.monitor ((< 0) <$> Signal.polling 1 (pure (1 :: Int))) (pure ()) (forM_ [1 .. 1000 :: Int] (const (sleep 86.4)))
 

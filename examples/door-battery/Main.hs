@@ -22,7 +22,7 @@ main = do
   how <- runBehavior $ case mode o of
     Really -> end <$> mission o putStrLn
     Simulated number -> do
-      (story, m) <- simulated o (maybe Undisturbed (Seeded . fromInteger) number)
+      (story, m) <- simulated o (maybe NonPreemptive (Seeded . fromInteger) number)
       traverse_ putStrLn story
       pure (maybe NotOver end m)
     Explored n -> do

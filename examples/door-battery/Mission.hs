@@ -128,5 +128,5 @@ simulated o schedule' = do
     defaults
       { Sim.scheduled = schedule'
       , Sim.endAt = 3600 -- computed in seconds
-      , Sim.patience = 1 / 0 -- who waits can press Ctrl-C
+      , Sim.realTimeLimit = 1 / 0 -- who waits can press Ctrl-C
       }

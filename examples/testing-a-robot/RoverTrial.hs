@@ -69,7 +69,7 @@ wayHome home plan =
 -- | Shows a failed expectation as hspec prints it.
 asHspec :: SomeException -> String
 asHspec (SomeException e) = case cast e of
-  Just (HUnitFailure _ reason) -> formatFailureReason reason
+  Just (HUnitFailure _ why) -> formatFailureReason why
   Nothing -> displayException e
 
 -- | At this time the rover is home and charged, if nobody presses the button.

@@ -33,7 +33,7 @@
 --      0.000 s  2 both: right  ends
 --      0.000 s  1 both: left   ends
 --      0.000 s  0 main         transaction
--- to see it again: explore (replaying (Switching [(5,2)]))
+-- to see it again: explore (replaying (Preempting [(5,2)]))
 --
 -- The same behaviours are simulated that run on the robot: plain 'IO', whose waiting goes
 -- through this library. "Behavior.Sim.Mock" has actions, conditions and sensors to take
@@ -87,15 +87,15 @@ module Behavior.Sim
   , Waiting (..)
   , Blocked (..)
   , Step (..)
-  , Did (..)
+  , StepKind (..)
   , Label (..)
-  , narrate
+  , renderSteps
   , ofThreads
   , mentioning
 
     -- * Many runs
   , explore
-  , exploring
+  , tryExplore
   , Plan (..)
   , Search (..)
   , randomly

@@ -27,7 +27,7 @@ spec = do
 simulation :: Spec
 simulation = do
   it "tells the story with the times of the world" $ do
-    (story, m) <- simulated (given []) Undisturbed
+    (story, m) <- simulated (given []) NonPreemptive
     end <$> m `shouldBe` Just TaskDone
     take 5 story
       `shouldBe` [ "    0.0 s   13 %  open front door ..."
@@ -40,21 +40,21 @@ simulation = do
 
   for_ endings $ \(arguments, expected, exit, line) ->
     it ("ends as the real one: " ++ unwords arguments) $ do
-      (story, m) <- simulated (given arguments) Undisturbed
+      (story, m) <- simulated (given arguments) NonPreemptive
       let how = maybe NotOver end m
       (how, status how) `shouldBe` (expected, exit)
       last story `shouldSatisfy` isSuffixOf line
 
   it "knows how far the battery came down" $ do
     -- Read every 10 ms, at 4 % a second, it is low just below 10 %.
-    (_, m) <- simulated (given []) Undisturbed
+    (_, m) <- simulated (given []) NonPreemptive
     lowest <$> m `shouldSatisfy` maybe False (\level -> level > 9.8 && level < 10)
-    (_, n) <- simulated (given ["--drain", "0"]) Undisturbed
+    (_, n) <- simulated (given ["--drain", "0"]) NonPreemptive
     lowest <$> n `shouldBe` Just 13
 
   it "that would go on for ever is given up" $ do
     -- Full for hardly a second, with a task that takes several.
-    (story, m) <- simulated (given ["--threshold", "95", "--speed", "0.1"]) Undisturbed
+    (story, m) <- simulated (given ["--threshold", "95", "--speed", "0.1"]) NonPreemptive
     m `shouldBe` Nothing
     status NotOver `shouldBe` ExitFailure 4
     last story `shouldContain` "given up"

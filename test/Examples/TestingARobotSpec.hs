@@ -26,9 +26,9 @@ spec = guarded $ do
       wayHome goHomeAtFirst (exhaustively 1) `failsAs` 2
     it "fails again by the schedule that the page shows" $ do
       found <- try (wayHome goHomeAtFirst (exhaustively 1))
-      again <- try (wayHome goHomeAtFirst (replaying (either failing (const Undisturbed) found)))
-      either (show . because) show again `shouldBe` either (show . because) show found
-      either (length . story) (const 0) again `shouldBe` either (length . story) (const (-1)) found
+      again <- try (wayHome goHomeAtFirst (replaying (either failing (const NonPreemptive) found)))
+      either (show . reason) show again `shouldBe` either (show . reason) show found
+      either (length . failingSteps) (const 0) again `shouldBe` either (length . failingSteps) (const (-1)) found
   describe "A failed expectation of hspec" $ do
     it "reads as hspec prints it, as the page says" $
       charged 20 (exhaustively 0) `failsAs` 5

@@ -40,7 +40,7 @@ specWith effort = do
   let counting needed act = do
         t <- act
         modifyIORef' explored (<> t)
-        schedulesTried t `shouldSatisfy` (>= needed)
+        schedulesExplored t `shouldSatisfy` (>= needed)
       counted = readIORef explored >>= \t -> putStrLn ("    (explored so far: " ++ show t ++ ")")
   forM_ promises $ \promise -> describe (promised promise) $ do
     it "under random schedules" $

@@ -27,7 +27,7 @@ import qualified Support
 -- | How much was tried.
 data Tried = Tried
   { programsTried :: !Int
-  , schedulesTried :: !Int
+  , schedulesExplored :: !Int
   , pointsTried :: !Int
   }
 
@@ -39,7 +39,7 @@ instance Monoid Tried where
 
 instance Show Tried where
   show t =
-    show (programsTried t) ++ " programs, " ++ show (schedulesTried t) ++ " schedules, "
+    show (programsTried t) ++ " programs, " ++ show (schedulesExplored t) ++ " schedules, "
       ++ show (pointsTried t)
       ++ " scheduling points"
 
@@ -72,7 +72,7 @@ underAll from preemptions limit n language (Promise name gen keeping) =
 
 tried :: String -> Search -> (Stage -> IO ()) -> IO Tried
 tried program how keeping =
-  exploring (randomly 1) {search = how, under = limits} (keeping . simulated) >>= \case
+  tryExplore (randomly 1) {search = how, runOptions = limits} (keeping . simulated) >>= \case
     Left counterexample -> broken ("of this program:\n" ++ program ++ "\n" ++ show counterexample)
     Right report
       | complete report -> pure (Tried 1 (schedules report) (pointsInAll report))
@@ -80,7 +80,7 @@ tried program how keeping =
 
 -- | No program comes near them.
 limits :: Options
-limits = defaults {standstill = 5000, endAt = 1000}
+limits = defaults {livelockLimit = 5000, endAt = 1000}
 
 -- | A simulated stage.
 simulated :: (Behavior () -> IO (Run ())) -> Stage
@@ -127,7 +127,7 @@ firstRejection limit seed language (Promise _ gen keeping) = go 1
     | otherwise = do
         let program = programFrom (gen Full) (seed * 1000003 + i)
         rejected <- newIORef False
-        _ <- exploring (randomly 1) {search = Random 1 (seed * 1000003 + i), under = limits} $ \simulating ->
+        _ <- tryExplore (randomly 1) {search = Random 1 (seed * 1000003 + i), runOptions = limits} $ \simulating ->
           keeping (simulated simulating) language program
             `catch` \(Broken _) -> writeIORef rejected True
         yes <- readIORef rejected

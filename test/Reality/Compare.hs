@@ -33,7 +33,7 @@ import Support (within)
 -- | A program, and what came of it.
 data Compared = Compared
   { compared :: Program
-  , schedulesTried :: Int
+  , schedulesExplored :: Int
   , simulated :: Set String
   -- ^ What comes of all schedules that there are.
   , real :: Set String
@@ -74,10 +74,10 @@ compareMany rule seed limit many runs found = go many (zip [seed ..] (programs s
 explored :: (IO String -> IO String) -> Int -> Program -> IO (Maybe (Int, Set String))
 explored rule limit p
   | size p > 14 = pure Nothing
-  | otherwise = outcomesBy (randomly 20) {under = options} >>= maybe (pure Nothing) (const everything)
+  | otherwise = outcomesBy (randomly 20) {runOptions = options} >>= maybe (pure Nothing) (const everything)
  where
-  everything = outcomesBy (randomly 1) {search = Exhaustive maxBound limit, under = options}
-  options = defaults {standstill = 2000}
+  everything = outcomesBy (randomly 1) {search = Exhaustive maxBound limit, runOptions = options}
+  options = defaults {livelockLimit = 2000}
   outcomesBy plan = do
     seen <- newIORef (Just Set.empty)
     report <- explore plan $ \simulated' -> do
@@ -128,7 +128,7 @@ instance Show Figures where
 
 figures :: Compared -> Figures
 figures c =
-  Figures 1 (if n > 1 then 1 else 0) (schedulesTried c) n (Set.size (Set.intersection (real c) (simulated c)))
+  Figures 1 (if n > 1 then 1 else 0) (schedulesExplored c) n (Set.size (Set.intersection (real c) (simulated c)))
  where
   n = Set.size (simulated c)
 

@@ -119,8 +119,8 @@ exploredBy plan program = do
   report <- explore plan $ \simulated -> do
     run <- simulated program
     modifyIORef' seen . Set.insert $ case outcome run of
-      Returned a | null (leftRunning run) -> a
-      Returned a -> a ++ ", and threads are left: " ++ show (leftRunning run)
+      Returned a | null (leakedThreads run) -> a
+      Returned a -> a ++ ", and threads are left: " ++ show (leakedThreads run)
       other -> explain other
   unless (complete report) (fail ("not explored completely: " ++ show report))
   readIORef seen

@@ -43,9 +43,9 @@ import Behavior.Internal.Source (watching, withShared)
 import qualified Behavior.Internal.Source as Library
 import Behavior.Internal.Time
 import Behavior.Sim
-  ( Did (Says)
+  ( StepKind (Note)
   , Label (..)
-  , Options (endAt, scheduled, slip, standstill)
+  , Options (endAt, scheduled, slip, livelockLimit)
   , Plan (..)
   , Report (complete)
   , Run (finished, outcome)
@@ -72,14 +72,14 @@ observed how world = observing (simulateWith (limits world) {scheduled = how}) w
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
-  report <- explore (exhaustively preemptions) {search = Exhaustive preemptions most, under = limits world} $ \simulated ->
+  report <- explore (exhaustively preemptions) {search = Exhaustive preemptions most, runOptions = limits world} $ \simulated ->
     observing simulated world >>= \seen -> modifyIORef' found (Set.insert seen)
   found' <- readIORef found
   pure (found', complete report)
 
 -- | A run without an end is cut short.
 limits :: World -> Options
-limits world = defaults {standstill = 20000, endAt = 60, slip = fromIntegral (slippage world)}
+limits world = defaults {livelockLimit = 20000, endAt = 60, slip = fromIntegral (slippage world)}
 
 observing :: (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Seen)
 observing simulated world = do
@@ -99,16 +99,16 @@ observing simulated world = do
     Sim.OutOfTime -> seen (Unknown (ticks (finished run)))
     Sim.Deadlock _ -> Left "a deadlock, though there is an end to wait for"
     Sim.Livelock labels -> Left ("livelock: " ++ show labels)
-    Sim.Outside who _ -> Left ("outside: " ++ show who)
-    Sim.Meddled waiting -> Left ("meddled: " ++ show waiting)
+    Sim.BlockedOutside who _ -> Left ("outside: " ++ show who)
+    Sim.ExternalWakeup waiting -> Left ("meddled: " ++ show waiting)
     Sim.TooSlow who _ -> Left ("too slow: " ++ show who)
-    Sim.Misfit why -> Left ("misfit: " ++ why)
+    Sim.ScheduleMismatch why -> Left ("misfit: " ++ why)
  where
   -- (Otherwise it would keep the whole run.)
   inFull whole = whole <$ evaluate (whole == whole)
   ticks = round
   recorded (s : others) events = case (did s, events) of
-    (Says _, event : later) -> (ticks (at s), event) : recorded others later
+    (Note _, event : later) -> (ticks (at s), event) : recorded others later
     -- The relation speaks of branches only.
     (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others events
     _ -> recorded others events

@@ -137,7 +137,7 @@ data Phase
   | -- | The branch for this value runs.
     Following Int Thread
   | -- | The branch was asked to stop, so that this can come next.
-    Switching Reaction Thread
+    Preempting Reaction Thread
   | -- | The recovery runs, and nothing else matters. Before it, perhaps, a branch ended
     -- wrongly.
     Recovering (Maybe Thread) Thread
@@ -230,7 +230,7 @@ faultOf thread' = [fault | Just (Faulted fault) <- [endOf thread']]
 threadsOf :: Phase -> [Thread]
 threadsOf = \case
   Following _ branch -> [branch]
-  Switching _ branch -> [branch]
+  Preempting _ branch -> [branch]
   Recovering before recovery -> maybe id (:) before [recovery]
   _ -> []
 
@@ -288,7 +288,7 @@ afterwards = \case
     other -> other
   ofPhase = \case
     Following value branch -> Following value (ofThread branch)
-    Switching next branch -> Switching next (ofThread branch)
+    Preempting next branch -> Preempting next (ofThread branch)
     Recovering before recovery -> Recovering (ofThread <$> before) (ofThread recovery)
     phase -> phase
   ofSource = \case

@@ -301,9 +301,9 @@ reactions t p source v phase = case phase of
         (_, Just (Right seen@(value, t', source')))
           | differs old seen -> silently t' (switching (reaction p (valueOf p value)) source' branch)
         _ -> []
-  Switching next branch -> case endOf branch of
+  Preempting next branch -> case endOf branch of
     Just result -> silently t (switched next result branch)
-    Nothing -> inThread (Switching next) branch
+    Nothing -> inThread (Preempting next) branch
   Recovering before recovery -> case endOf recovery of
     Just result -> silently t (recovered before result recovery)
     Nothing -> inThread (Recovering before) recovery
@@ -320,7 +320,7 @@ reactions t p source v phase = case phase of
    where
     value = valueOf p seen
   -- Unless there will be nothing to sense, the sensors go on.
-  switching next source' branch = Reacting p (alike source') v (Switching next (ask branch))
+  switching next source' branch = Reacting p (alike source') v (Preempting next (ask branch))
    where
     alike = case next of
       Run _ -> id

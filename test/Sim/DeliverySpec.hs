@@ -131,7 +131,7 @@ asGHC = do
         )
         (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
     [(at s, did s) | s <- steps run, label s == Label "target" "", did s `notElem` [Starts, Ends]]
-      `shouldBe` [(2, Says "unmasks"), (2, Hears (show (Cancel "a"))), (2, Says "handles")]
+      `shouldBe` [(2, Note "unmasks"), (2, ReceivesException (show (Cancel "a"))), (2, Note "handles")]
 
 -- | Unmasks until nothing is raised any more.
 untilNone :: IO () -> (String -> IO ()) -> IO ()

@@ -43,7 +43,7 @@ records = do
     [ ("at endAt", \act -> simulateWith defaults {endAt = 10} (act (sleep 100)))
     , ("at endAt, though nothing would ever happen", \act -> simulateWith defaults {endAt = 10} (act (atomically retry)))
     , ("in a deadlock", \act -> simulate (act (atomically retry)))
-    , ("in a livelock", \act -> simulateWith defaults {standstill = 1000} (act (forever checkpoint)))
+    , ("in a livelock", \act -> simulateWith defaults {livelockLimit = 1000} (act (forever checkpoint)))
     , ("in a deadlock, in another thread", \act -> simulate (both (act (atomically retry)) (sleep 1)))
     , ("where it waits outside", \act -> simulate (act (newEmptyMVar >>= takeMVar)))
     ]
@@ -61,7 +61,7 @@ records = do
     mock <- newMock
     motor <- motorOf mock
     begun <- newEmptyMVar
-    let going = simulateWith defaults {standstill = maxBound} (motor (checkpoint >> putMVar begun () >> forever checkpoint))
+    let going = simulateWith defaults {livelockLimit = maxBound} (motor (checkpoint >> putMVar begun () >> forever checkpoint))
     withAsync (void going) $ \caller -> takeMVar begun >> cancel caller
     -- (The cancellation itself finds the behaviour anywhere, but not in its cleanup.)
     count (becoming "motor runs" False) <$> happened mock `shouldReturn` 1
@@ -93,16 +93,16 @@ ends = do
     schedules report `shouldBe` 20
   it "or else a run without an end is cut off, and what is said names endAt, and how far it came" $ do
     -- By default it is over within 10 s.
-    patience defaults `shouldBe` 9
+    realTimeLimit defaults `shouldBe` 9
     begun <- getMonotonicTime
-    run <- simulateWith defaults {patience = 0.2} (forever (sleep 1) :: Behavior ())
+    run <- simulateWith defaults {realTimeLimit = 0.2} (forever (sleep 1) :: Behavior ())
     over <- getMonotonicTime
     case outcome run of
       TooSlow _ came -> do
         came `shouldSatisfy` (> 10)
         came `shouldSatisfy` (<= finished run)
       _ -> expectationFailure (explain (outcome run))
-    explain (outcome run) `shouldSatisfy` \said -> all (`isInfixOf` said) ["s of virtual time", "see endAt", "see patience"]
+    explain (outcome run) `shouldSatisfy` \said -> all (`isInfixOf` said) ["s of virtual time", "see endAt", "see realTimeLimit"]
     over - begun `shouldSatisfy` (< 8)
 
 faults' :: Spec
@@ -113,12 +113,12 @@ faults' = do
   it "of one that is thrown to another thread, in the steps too" $ do
     run <- simulate (parallel (sleep 1) (sleep 2 `catch` \(e :: SomeException) -> throwIO (if null (show e) then toException e else toException Unshowable)))
     explain (outcome run) `shouldBe` "it faulted: it was <its text throws an exception>"
-    length (narrate (steps run)) `shouldSatisfy` (> 10)
+    length (renderSteps (steps run)) `shouldSatisfy` (> 10)
   it "of one that a scripted action throws, in the record too" $ do
     mock <- newMock
     act <- action mock "act" [throws Unshowable :: Script ()]
     run <- simulate act
-    length (narrate (steps run)) `shouldSatisfy` (> 10)
+    length (renderSteps (steps run)) `shouldSatisfy` (> 10)
     mock `shouldRecord` exactly 1 (faultOf "act")
   it "of a thread that waits for what another computes" $ do
     begun <- newEmptyMVar
@@ -126,10 +126,10 @@ faults' = do
     let lazy = unsafePerformIO (putMVar begun () >> takeMVar never') :: Int
     _ <- forkIO (void (evaluate lazy))
     takeMVar begun
-    run <- simulateWith defaults {patience = 0.3} (void (evaluate lazy))
+    run <- simulateWith defaults {realTimeLimit = 0.3} (void (evaluate lazy))
     putMVar never' 1
     case outcome run of
-      Outside thread InThunk -> show thread `shouldBe` "main"
+      BlockedOutside thread InThunk -> show thread `shouldBe` "main"
       other -> expectationFailure (explain other)
     explain (outcome run) `shouldSatisfy` ("for a value that another thread is computing" `isInfixOf`)
 
@@ -144,7 +144,7 @@ instance Exception Unshowable
 wide :: Spec
 wide = do
   it "of 10,000 threads costs at most 12 times what one of 1,000 does" $
-    costs Undisturbed fromIntegral
+    costs NonPreemptive fromIntegral
   it "so in a random schedule, when all sleep until one moment" $
     costs (Seeded 7) (const 1)
  where
@@ -156,7 +156,7 @@ wide = do
   allocated schedule' moment n = do
     performMajorGC
     before' <- allocated_bytes <$> getRTSStats
-    run <- simulateWith defaults {scheduled = schedule', patience = 60} (allOf [sleep (moment i) | i <- [1 .. n :: Int]])
+    run <- simulateWith defaults {scheduled = schedule', realTimeLimit = 60} (allOf [sleep (moment i) | i <- [1 .. n :: Int]])
     explain (outcome run) `shouldBe` "it returned"
     performMajorGC
     after' <- allocated_bytes <$> getRTSStats

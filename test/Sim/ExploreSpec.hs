@@ -44,7 +44,7 @@ random = do
     report <- explore (randomly 123) $ \run -> modifyIORef runs (+ 1) >> void (run (both (sleep 1) (sleep 1)))
     (,) (schedules report) <$> readIORef runs `shouldReturn` (123, 123)
   it "finds a defect that needs one pre-emption" $ do
-    found <- exploring (randomly 1000) (counting 2)
+    found <- tryExplore (randomly 1000) (counting 2)
     either (const "found") show found `shouldBe` "found"
   it "is the same for the same seed, and another for another" $ do
     let from seed = do
@@ -82,9 +82,9 @@ exhaustive = do
       made <- run (void (allOf [checkpoint, checkpoint, checkpoint]))
       modifyIORef seen (schedule made :)
     take 6 . reverse <$> readIORef seen
-      `shouldReturn` map Switching [[], [(13, 3)], [(9, 3)], [(8, 2)], [(8, 2), (12, 3)], [(8, 3)]]
+      `shouldReturn` map Preempting [[], [(13, 3)], [(9, 3)], [(8, 2)], [(8, 2), (12, 3)], [(8, 3)]]
   it "finds nothing with fewer pre-emptions than a defect needs" $ do
-    let undisturbed k = either (const False) complete <$> exploring (exhaustively k) (counting 2)
+    let undisturbed k = either (const False) complete <$> tryExplore (exhaustively k) (counting 2)
     (,) <$> undisturbed 0 <*> undisturbed 1 `shouldReturn` (True, False)
   it "says so when there are more schedules than it may run" $ do
     report <- explore (exhaustively 3) {search = Exhaustive 3 50} $ \run -> void (run (both (sleep 1) (sleep 1)))
@@ -93,21 +93,21 @@ exhaustive = do
 counterexample :: Spec
 counterexample = do
   it "is shrunk to as few switches as it takes" $ do
-    found <- exploring (randomly 1000) (counting 3)
+    found <- tryExplore (randomly 1000) (counting 3)
     case found of
-      Left c | Switching s <- failing c -> length s `shouldBe` 1
+      Left c | Preempting s <- failing c -> length s `shouldBe` 1
       _ -> expectationFailure "it should have been found"
   it "fails again when it is replayed from its text" $ do
-    found <- exploring (randomly 1000) (counting 3)
+    found <- tryExplore (randomly 1000) (counting 3)
     case found of
       Left c -> do
         let text = drop (length "to see it again: explore (replaying (") (last (lines (show c)))
             printed = take (length text - 2) text
-        again <- exploring (replaying (read printed)) (counting 3)
-        either (show . because) (const "it held") again `shouldBe` show (because c)
+        again <- tryExplore (replaying (read printed)) (counting 3)
+        either (show . reason) (const "it held") again `shouldBe` show (reason c)
       Right _ -> expectationFailure "it should have been found"
   it "tells what happened, with times and threads" $ do
-    found <- exploring (randomly 1000) (counting 2)
+    found <- tryExplore (randomly 1000) (counting 2)
     case found of
       Left c -> do
         show c `shouldContain` "Fault \"counted 1\""
@@ -118,33 +118,33 @@ counterexample = do
                      ]
       Right _ -> expectationFailure "it should have been found"
   it "shows what the property threw as the plan says" $ do
-    found <- exploring (randomly 1000) {showException = const "not two"} (counting 2)
+    found <- tryExplore (randomly 1000) {showException = const "not two"} (counting 2)
     take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one switch, this happens:"]
   it "shows what did not happen again as the plan says" $ do
     runs <- newIORef (0 :: Int)
-    found <- exploring (randomly 1) {showException = maybe "another" (\(Fault what') -> "fault " ++ what') . fromException} $ \run -> do
+    found <- tryExplore (randomly 1) {showException = maybe "another" (\(Fault what') -> "fault " ++ what') . fromException} $ \run -> do
       n <- atomicModifyIORef' runs (\n -> (n + 1, n))
       _ <- run (pure ())
       when (n == 0) (throwIO (Fault "once"))
-    either (show . because) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
+    either (show . reason) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
   it "shows only the steps that the plan selects, and how many" $ do
-    found <- exploring (randomly 1000) {selectSteps = mentioning ["saw"]} (counting 2)
+    found <- tryExplore (randomly 1000) {selectSteps = mentioning ["saw"]} (counting 2)
     (drop 2 . lines <$> either (Just . show) (const Nothing) found)
       `shouldBe` Just
         [ "shrunk to one switch, this happens (2 of 21 steps):"
         , "     0.000 s  1 both: left         saw 0"
         , "     0.000 s  3 both: left (of 2)  saw 0"
-        , "to see it again: explore (replaying (Switching [(5,2)]))"
+        , "to see it again: explore (replaying (Preempting [(5,2)]))"
         ]
   it "has the steps of some threads" $ do
     run <- simulate (both (sleep 1) (both (sleep 1) (sleep 1)))
     map number (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
   it "has the steps in which a name occurs, in a label or in what was done" $ do
     run <- simulate (both (note "a") (note "left"))
-    [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Says "a"), (1, Ends), (2, Says "left")]
+    [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
   it "tells the branches of two operators apart" $ do
     run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
-    lines (narrate (mentioning ["starts", "asks"] (steps run)))
+    lines (renderSteps (mentioning ["starts", "asks"] (steps run)))
       `shouldBe` [ "     0.000 s  1 both: left              starts"
                  , "     0.000 s  2 both: right             starts"
                  , "     0.000 s  3 parallel: left (of 1)   starts"
@@ -157,12 +157,12 @@ counterexample = do
     map parentNumber (take 2 (steps run)) `shouldBe` [-1, 0]
   it "is found from a schedule that fails, by schedules with fewer switches" $ do
     let first = Seeded 18 -- the eighteenth of those that seed 0 tries
-    found <- exploring (replaying first) {search = Shrink first} (counting 2)
-    either failing (const first) found `shouldBe` Switching [(5, 2)]
-    held <- exploring (replaying Undisturbed) {search = Shrink Undisturbed} (counting 2)
+    found <- tryExplore (replaying first) {search = Shrink first} (counting 2)
+    either failing (const first) found `shouldBe` Preempting [(5, 2)]
+    held <- tryExplore (replaying NonPreemptive) {search = Shrink NonPreemptive} (counting 2)
     either show (show . schedules) held `shouldBe` "1"
   it "of a deadlock tells who waited" $ do
-    found <- exploring (randomly 100) $ \run -> do
+    found <- tryExplore (randomly 100) $ \run -> do
       made <- run (both (pure ()) (atomically retry :: Behavior ()))
       case outcome made of
         Returned () -> pure ()
@@ -171,7 +171,7 @@ counterexample = do
 
   it "says so when what it tells did not happen again" $ do
     runs <- newIORef (0 :: Int)
-    found <- exploring (randomly 100) $ \run -> do
+    found <- tryExplore (randomly 100) $ \run -> do
       modifyIORef runs (+ 1)
       n <- readIORef runs
       _ <- run (sleep 1)
@@ -184,17 +184,17 @@ properties :: Spec
 properties = do
   it "need not simulate" $ schedules <$> explore (randomly 3) (const (pure ())) `shouldReturn` 3
   it "simulates only once" $ do
-    found <- exploring (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
-    either (show . because) show found `shouldBe` "explore: a property simulates only once"
+    found <- tryExplore (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
+    either (show . reason) show found `shouldBe` "explore: a property simulates only once"
   it "is told of a run that is none" $ do
-    found <- exploring (randomly 1) {under = defaults {patience = 0.1}} $ \run ->
+    found <- tryExplore (randomly 1) {runOptions = defaults {realTimeLimit = 0.1}} $ \run ->
       void (run (mapM_ (evaluate . length . show) [0 :: Int ..]))
-    either (show . because) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
+    either (show . reason) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
   it "that throws a cancellation ends the exploration" $ do
     end <- ending (schedules <$> explore (randomly 3) (\_ -> throwIO (Cancel "user")))
     end `shouldBe` CancelledBy (show (Cancel "user"))
   it "of a schedule that does not fit is told why" $ do
-    found <- exploring (replaying (Switching [(2, 9)])) $ \run -> do
+    found <- tryExplore (replaying (Preempting [(2, 9)])) $ \run -> do
       made <- run (both (sleep 1) (sleep 1))
       when (points made < 0) (fail "unreachable")
-    either (show . because) show found `shouldSatisfy` ("the schedule does not fit" `isInfixOf`)
+    either (show . reason) show found `shouldSatisfy` ("the schedule does not fit" `isInfixOf`)

@@ -205,7 +205,7 @@ records = do
     act <- action mock "act" [fails "x" `taking` 2]
     low <- condition mock "low" [(0, False), (1, True)]
     ran <- simulate (act ? Signal.waitUntil (signal low))
-    [(Sim.at step, text) | step <- Sim.steps ran, Sim.Says text <- [Sim.did step]]
+    [(Sim.at step, text) | step <- Sim.steps ran, Sim.Note text <- [Sim.did step]]
       `shouldBe` [(0, "act: begins"), (2, "act: fails, x"), (2, "low: becomes True")]
     story mock `shouldReturn` ["0.0 s  low: is False", "0.0 s  act: begins", "1.0 s  low: becomes True", "2.0 s  act: fails, x"]
 
@@ -255,7 +255,7 @@ polled = do
   it "fails while there is no value" $
     for_ [(0, none), (1, "returned 'a'"), (2, none)] $ \(t, end) -> do
       mock <- newMock
-      level <- unsteady mock "level" [(1, Just 'a'), (2, Nothing)]
+      level <- partialCondition mock "level" [(1, Just 'a'), (2, Nothing)]
       run (begin mock >> sleep t >> reading level) `shouldReturn` (end, t)
 
   it "can change for ever" $ do
@@ -299,7 +299,7 @@ watched = do
 
   it "waits for its first value, and fails its operator when that is lost" $ do
     mock <- newMock
-    level <- unsteady mock "level" [(1, Just 'a'), (2, Nothing)]
+    level <- partialCondition mock "level" [(1, Just 'a'), (2, Nothing)]
     run (Signal.waitUntil ((== 'b') <$> signal level)) `shouldReturn` ("failed FailedBecause \"level has no value any more\"", 2)
 
   it "starts no thread that outlives its operator, nor any when it will not change" $ do
@@ -336,7 +336,7 @@ setting = do
   it "can lose its value" $ do
     mock <- newMock
     wet <- condition mock "wet" [(0, False)]
-    run (Signal.waitUntil (signal wet) `both` (sleep 1 >> lose wet))
+    run (Signal.waitUntil (signal wet) `both` (sleep 1 >> clear wet))
       `shouldReturn` ("failed FailedBecause \"wet has no value any more\"", 1)
 
 worlds :: Spec

@@ -18,12 +18,12 @@ import Support
 
 spec :: Spec
 spec = guarded $ do
-  describe "A property under schedules" schedulesTried
+  describe "A property under schedules" searches
   describe "Of a property under schedules QuickCheck's verdict stands:" verdicts
   describe "Several schedules for each test" several
 
-schedulesTried :: Spec
-schedulesTried = do
+searches :: Spec
+searches = do
   prop "holds, whatever is generated" $
     forAll durations $ \(s, t) -> underSchedules $ \simulating -> do
       run <- simulating (both (sleep s) (sleep t))
@@ -31,7 +31,7 @@ schedulesTried = do
   it "does not hold if it does not under one of them" $ do
     result <- quickCheckWithResult thorough counting
     output result `shouldContain` "shrunk to one switch"
-    output result `shouldContain` "to see it again: explore (replaying (Switching [("
+    output result `shouldContain` "to see it again: explore (replaying (Preempting [("
     output result `shouldContain` "1 /= 2"
   it "may throw instead" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating -> do
@@ -86,14 +86,14 @@ verdicts = do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating -> do
       _ <- simulating (sleep 1)
       pure (forAllShrink (choose (0, 1000000)) shrink (\n -> (n :: Int) < 20))
-    drop 3 (lines (output result)) `shouldBe` ["to see it again: explore (replaying (Switching []))", "20"]
+    drop 3 (lines (output result)) `shouldBe` ["to see it again: explore (replaying (Preempting []))", "20"]
   it "what is generated inside may be simulated, and what is told is what was shrunk" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating ->
       pure . forAllShrink (choose (0, 1000)) shrink $ \n -> ioProperty $ do
         run <- simulating (sleep (fromIntegral (n :: Int)))
         pure (finished run < 20)
     drop 2 (lines (output result))
-      `shouldBe` ["     0.000 s  0 main  sleeps until 20.000 s", "to see it again: explore (replaying (Switching []))", "20"]
+      `shouldBe` ["     0.000 s  0 main  sleeps until 20.000 s", "to see it again: explore (replaying (Preempting []))", "20"]
   it "nothing is shrunk if it is told to shrink nothing" $ do
     result <- quickCheckWithResult thorough {maxShrinks = 0} counting
     numShrinks result `shouldBe` 0

@@ -25,8 +25,8 @@ spec = guarded $ do
   describe "What goes on for a while" whiles
 
 -- | A line about something that has no arguments and is called once.
-line :: Seconds -> String -> Happening -> Entry
-line t who = Entry t who "" 1
+line :: Seconds -> String -> EntryKind -> RecordEntry
+line t who = RecordEntry t who "" 1
 
 -- | A robot drives, its battery runs low, it stops slowly and charges; the battery is
 -- full again, and a second drive fails.
@@ -42,8 +42,8 @@ day =
     , line 5 "charge" Begins
     , line 9 "low" (Becomes "False")
     , line 9 "charge" Succeeds
-    , Entry 9 "drive" "" 2 Begins
-    , Entry 12 "drive" "" 2 (Fails "stuck")
+    , RecordEntry 9 "drive" "" 2 Begins
+    , RecordEntry 12 "drive" "" 2 (Fails "stuck")
     , line 12 "help!" Remarked
     ]
 
@@ -198,7 +198,7 @@ refutation = do
 moments :: Spec
 moments = do
   it "are those of the one argument, or of any" $ do
-    let doors = Record ["open"] [Entry 0 "open" "\"front\"" 1 Begins, Entry 1 "open" "\"front\"" 1 (Fails "locked"), Entry 1 "open" "\"back\"" 1 Begins]
+    let doors = Record ["open"] [RecordEntry 0 "open" "\"front\"" 1 Begins, RecordEntry 1 "open" "\"front\"" 1 (Fails "locked"), RecordEntry 1 "open" "\"back\"" 1 Begins]
     count (startOf "open") doors `shouldBe` 2
     count (startOf "open \"front\"") doors `shouldBe` 1
     doors `shouldSatisfy` holds (never (startOf "open \"cellar\""))
@@ -227,7 +227,7 @@ whiles = do
     map overlaps [one, nested, apart, open] `shouldBe` [1, 1, 0, 1]
 
   it "overlap with themselves when two calls run at once" $ do
-    let rows = [Entry 0 "a" "" 1 Begins, Entry 1 "a" "" 2 Begins, Entry 2 "a" "" 1 Succeeds, Entry 3 "a" "" 3 Begins, Entry 4 "a" "" 2 Stops]
+    let rows = [RecordEntry 0 "a" "" 1 Begins, RecordEntry 1 "a" "" 2 Begins, RecordEntry 2 "a" "" 1 Succeeds, RecordEntry 3 "a" "" 3 Begins, RecordEntry 4 "a" "" 2 Stops]
     count (running "a" `overlapping` running "a") (Record ["a"] rows) `shouldBe` 2
 
   it "go on through the cleanup" $

@@ -129,7 +129,7 @@ delivery = do
   it "to a thread that has not begun: before its first step" $ do
     book <- newIORef []
     -- The second thread is the third to run, when the first has failed.
-    void . simulateWith defaults {scheduled = Switching [(4, 1), (5, 1), (6, 0)]} $
+    void . simulateWith defaults {scheduled = Preempting [(4, 1), (5, 1), (6, 0)]} $
       parallel (failed :: Behavior ()) (modifyIORef book ("began" :))
     began <- readIORef book
     began `shouldSatisfy` (`elem` [[], ["began"]])
@@ -156,11 +156,11 @@ mistakes = do
                  , "  both: right waits for the end of time"
                  ]
   it "a livelock" $ do
-    run <- simulateWith defaults {standstill = 3000} (parallel (forever checkpoint) (forever checkpoint))
+    run <- simulateWith defaults {livelockLimit = 3000} (parallel (forever checkpoint) (forever checkpoint))
     explain (outcome run)
       `shouldBe` "livelock: the virtual time stands still while these run on and on: parallel: left, parallel: right"
   it "a livelock of one thread" $ do
-    run <- simulateWith defaults {standstill = 3000} (forever checkpoint :: Behavior ())
+    run <- simulateWith defaults {livelockLimit = 3000} (forever checkpoint :: Behavior ())
     explain (outcome run) `shouldContain` "livelock"
   describe "who waits outside of the library," $ do
     outside "takeMVar" (newEmptyMVar >>= takeMVar) "use atomically and a TMVar"
@@ -185,10 +185,10 @@ mistakes = do
     run <- simulate (atomically comesTrue)
     explain (outcome run) `shouldContain` "something outside of the simulation changed what these waited for"
   it "a computation without end" $ do
-    run <- simulateWith defaults {patience = 0.1} (mapM_ (evaluate . length . show) [0 :: Int ..])
+    run <- simulateWith defaults {realTimeLimit = 0.1} (mapM_ (evaluate . length . show) [0 :: Int ..])
     explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
   it "a loop that never allocates, if it is compiled so that it can be interrupted" $ do
-    run <- simulateWith defaults {patience = 0.1} (busy 0)
+    run <- simulateWith defaults {realTimeLimit = 0.1} (busy 0)
     explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
   it "a simulation inside of a simulation" $ do
     run <- simulate (finished <$> simulate (pure ()))
@@ -196,7 +196,7 @@ mistakes = do
   describe "a schedule that does not fit" $ do
     let small = both (sleep 1) (sleep 2)
         misfit switches text = do
-          run <- simulateWith defaults {scheduled = Switching switches} small
+          run <- simulateWith defaults {scheduled = Preempting switches} small
           explain (outcome run) `shouldContain` ("the schedule does not fit this behaviour: " ++ text)
     it "as no such thread can run" $ misfit [(3, 7)] "at point 3 thread 7 cannot run; those that can: [1,2]"
     it "as the run is shorter" $ misfit [(300, 1)] "the run ended before point 300"
@@ -253,13 +253,13 @@ unwinding = do
     book <- newIORef []
     begun <- newEmptyMVar
     let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef book ("cleaned up" :)
-    withAsync (simulateWith defaults {standstill = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
+    withAsync (simulateWith defaults {livelockLimit = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
       takeMVar begun
       cancel caller
     readIORef book `shouldReturn` ["cleaned up"]
   it "a fork that outlives its scope cannot be" $ do
     run <- simulate (scoped (\nursery -> void (fork nursery (sleep 100)) >> sleep 1))
-    (finished run, leftRunning run) `shouldBe` (1, [])
+    (finished run, leakedThreads run) `shouldBe` (1, [])
 
 beside :: Spec
 beside = do
@@ -288,4 +288,4 @@ beside = do
   it "a note of theirs is not in the record" $ do
     note "of nobody"
     run <- simulate (note "of mine")
-    [text | Says text <- map did (steps run)] `shouldBe` ["of mine"]
+    [text | Note text <- map did (steps run)] `shouldBe` ["of mine"]

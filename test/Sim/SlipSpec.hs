@@ -40,7 +40,7 @@ spec = guarded . describe "Slip" $ do
       (steps one, schedule one, finished one) `shouldBe` (steps other, schedule other, finished other)
   it "is explored exhaustively, and is no pre-emption" $ do
     orders <- newIORef []
-    report <- explore ((exhaustively 0) {under = defaults {slip = 0.5}}) $ \simulated -> do
+    report <- explore ((exhaustively 0) {runOptions = defaults {slip = 0.5}}) $ \simulated -> do
       order <- newTVarIO []
       _ <- simulated (ordered order [1, 1.3, 1.4])
       readTVarIO order >>= \o -> modifyIORef orders (reverse o :)
@@ -52,7 +52,7 @@ spec = guarded . describe "Slip" $ do
       run <- simulateWith defaults {scheduled = Seeded seed, slip = 5, endAt = 2} (both (sleep 1) (sleep 4))
       finished run `shouldBe` 2
   it "finds what hangs on exact timers" $ do
-    found <- exploring ((randomly 1000) {under = defaults {slip = 0.1}}) $ \simulated -> do
+    found <- tryExplore ((randomly 1000) {runOptions = defaults {slip = 0.1}}) $ \simulated -> do
       run <- simulated $ do
         parked <- newTVarIO False
         both

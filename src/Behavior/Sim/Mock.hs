@@ -48,20 +48,20 @@ module Behavior.Sim.Mock
     -- * What the robot perceives
   , sensor
   , condition
-  , unsteady
+  , partialCondition
   , Condition
   , signal
   , reading
   , set
-  , lose
+  , clear
 
     -- * What has happened
   , shouldRecord
   , BrokenClaim (..)
   , happened
   , Record (..)
-  , Entry (..)
-  , Happening (..)
+  , RecordEntry (..)
+  , EntryKind (..)
 
     -- * Claims
   , Claim
@@ -92,7 +92,7 @@ module Behavior.Sim.Mock
   , count
 
     -- ** What goes on for a while
-  , Stretch
+  , Interval
   , running
   , being
   ) where

@@ -94,7 +94,7 @@ sensor mock name scripts = do
   christen mock "sensor" name
   calls <- newIORef Map.empty
   newest <- newIORef Nothing
-  let say t what = tell mock (Entry t name "" 1 what)
+  let say t what = tell mock (RecordEntry t name "" 1 what)
       telling =
         Telling
           { says = \t what -> when (isTrouble what) (say t what)
@@ -114,7 +114,7 @@ sensor mock name scripts = do
 
 -- | How a call puts on record what happens to it.
 data Telling a = Telling
-  { says :: Seconds -> Happening -> IO ()
+  { says :: Seconds -> EntryKind -> IO ()
   , gives :: Seconds -> a -> IO ()
   -- ^ It returns this.
   }
@@ -126,7 +126,7 @@ type Calls a = IORef (Map String (Int, [Script a]))
 nextCall :: Mock -> Calls a -> String -> String -> [Script a] -> IO (Script a, Telling a)
 nextCall mock calls name x scripts = do
   (n, script) <- takeTurn calls x scripts
-  let say t what = tell mock (Entry t name x n what)
+  let say t what = tell mock (RecordEntry t name x n what)
   pure (script, Telling {says = say, gives = \t _ -> say t Succeeds})
 
 -- | Takes the number of the call and its script, in one step, whoever calls at the
@@ -173,7 +173,7 @@ pass seconds since
   | otherwise = sleepUntil (since + seconds)
 
 -- | What is to be said of an end with this exception.
-ending :: SomeException -> Happening
+ending :: SomeException -> EntryKind
 ending e
   | isCancellation e = Stops
   | isFailure e = Fails (legible (maybe (show e) reason (fromException e)))

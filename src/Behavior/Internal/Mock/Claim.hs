@@ -30,7 +30,7 @@ import Behavior.Internal.Runtime (Seconds)
 -- $setup
 -- >>> import Behavior.Sim.Mock
 -- >>> import Behavior.Internal.Mock.Record
--- >>> let line s who = Entry s who "" 1
+-- >>> let line s who = RecordEntry s who "" 1
 -- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" AskedToStop, line 5 "drive" Stops]
 -- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
 -- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
@@ -118,7 +118,7 @@ exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords 
 -- True
 --
 -- @since 0.1.0.0
-always :: Stretch -> Claim
+always :: Interval -> Claim
 always s = Claim ("always " ++ spanWords s) (spanNames s) $ \rows (Origin origin _) ->
   let isInside n = any (\(from, to) -> from <= n && n < to) (stretches s rows)
    in case [row | row@(n, entry) <- rows, n > origin, not (setting entry || isInside n)] of
@@ -179,7 +179,7 @@ claimOf :: String -> Moment -> (Origin -> Lines -> Maybe (String, Lines)) -> Cla
 claimOf words' m judge = Claim words' (momentNames m) $ \rows origin@(Origin after _) ->
   judge origin (filter ((> after) . fst) (occurrences m rows))
 
-time :: (Int, Entry) -> Seconds
+time :: (Int, RecordEntry) -> Seconds
 time = happenedAt . snd
 
 -- | Whether a claim holds, to be said as hspec says it:
@@ -215,7 +215,7 @@ verdict claim record = case (strangers, broken claim (numbered record) (Origin (
 
 -- | The lines that show something, marked, each with a few around it; when none
 -- does, the last ones.
-excerpt :: [Int] -> [Entry] -> [String]
+excerpt :: [Int] -> [RecordEntry] -> [String]
 excerpt seen rows = gaps 0 [(n, marked n line) | (n, line) <- zip [0 ..] (timeline rows), near n]
  where
   near n = any (\k -> abs (n - k) <= 2) (if null seen then [length rows - 3] else seen)

@@ -9,11 +9,11 @@
 module Behavior.Internal.Mock.Condition
   ( Condition
   , condition
-  , unsteady
+  , partialCondition
   , signal
   , reading
   , set
-  , lose
+  , clear
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -44,7 +44,7 @@ data Condition a = Condition
   , current :: TVar (Maybe a)
   , ahead :: TVar [(Seconds, Maybe a)]
   -- ^ The changes to come.
-  , says :: Maybe a -> Maybe a -> [Happening]
+  , says :: Maybe a -> Maybe a -> [EntryKind]
   -- ^ What to say of a change from one to the other.
   }
 
@@ -68,17 +68,17 @@ data Condition a = Condition
 --
 -- @since 0.1.0.0
 condition :: Show a => Mock -> String -> [(Seconds, a)] -> IO (Condition a)
-condition mock name = unsteady mock name . map (fmap Just)
+condition mock name = partialCondition mock name . map (fmap Just)
 
 -- | A 'condition' that at times has no value ('Nothing').
 --
--- >>> beacon <- unsteady mock "beacon" [(0, Just 'a'), (0.001, Nothing)]
+-- >>> beacon <- partialCondition mock "beacon" [(0, Just 'a'), (0.001, Nothing)]
 -- >>> Signal.waitUntil ((== 'b') <$> signal beacon)
 -- *** Exception: FailedBecause "beacon has no value any more"
 --
 -- @since 0.1.0.0
-unsteady :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
-unsteady mock name changes = do
+partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
+partialCondition mock name changes = do
   -- Of endlessly many only so many can be looked at beforehand.
   for_ (zip (Nothing : map Just times) (take 1000 times)) $ uncurry checkTime
   christen mock "condition" name
@@ -100,12 +100,12 @@ unsteady mock name changes = do
     | fmap show old == fmap show new = []
     | otherwise = [maybe LosesItsValue (Becomes . show) new]
 
-entry :: Condition a -> Seconds -> Happening -> Entry
-entry c t = Entry t (nameOf c) "" 1
+entry :: Condition a -> Seconds -> EntryKind -> RecordEntry
+entry c t = RecordEntry t (nameOf c) "" 1
 
 -- | The changes ahead whose time has come: what then is the value, what is still to
 -- come, and what is to be put on record.
-due :: Condition a -> (Seconds -> Bool) -> STM (Maybe a, [(Seconds, Maybe a)], [Entry])
+due :: Condition a -> (Seconds -> Bool) -> STM (Maybe a, [(Seconds, Maybe a)], [RecordEntry])
 due c hasCome = do
   old <- readTVar (current c)
   (passed, others) <- span (hasCome . fst) <$> readTVar (ahead c)
@@ -116,7 +116,7 @@ due c hasCome = do
 -- | Asks for the time, makes the changes that are due, then runs the transaction, all
 -- in one step. (The transaction does not wait; so, masked, it is not interrupted
 -- before all is on record.) It is told when the world began, and what time it is.
-upToDate :: Condition a -> (Seconds -> Seconds -> STM (b, [Entry])) -> IO b
+upToDate :: Condition a -> (Seconds -> Seconds -> STM (b, [RecordEntry])) -> IO b
 upToDate c transaction = do
   (zero, t) <- clock (world c)
   mask_ $ do
@@ -184,13 +184,13 @@ set c = change c . Just
 -- | Takes the value away, as from a sensor that has died.
 --
 -- >>> gps <- condition mock "gps" [(0, "at home")]
--- >>> lose gps
+-- >>> clear gps
 -- >>> reading gps ? pure "lost"
 -- "lost"
 --
 -- @since 0.1.0.0
-lose :: Condition a -> Behavior ()
-lose c = change c Nothing
+clear :: Condition a -> Behavior ()
+clear c = change c Nothing
 
 change :: Condition a -> Maybe a -> Behavior ()
 change c new = upToDate c $ \zero t -> do

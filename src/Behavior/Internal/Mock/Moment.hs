@@ -25,7 +25,7 @@ module Behavior.Internal.Mock.Moment
   , count
 
     -- * Spans
-  , Stretch (..)
+  , Interval (..)
   , running
   , being
   ) where
@@ -38,14 +38,14 @@ import Behavior.Internal.Mock.Record
 -- $setup
 -- >>> import Behavior.Sim.Mock
 -- >>> import Behavior.Internal.Mock.Record
--- >>> let line s who = Entry s who "" 1
+-- >>> let line s who = RecordEntry s who "" 1
 -- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" AskedToStop, line 5 "drive" Stops]
 -- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
 -- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
 -- >>> let check claim = either putStr pure (verdict claim record)
 
 -- | The entries of a record, numbered from 0.
-type Lines = [(Int, Entry)]
+type Lines = [(Int, RecordEntry)]
 
 -- | What kind of thing may have happened, once or often: @startOf "recharge"@.
 --
@@ -90,7 +90,7 @@ failureOf = momentOf "fails" isFailing
 faultOf :: String -> Moment
 faultOf = momentOf "faults" isFaulting
 
-isFaulting :: Happening -> Bool
+isFaulting :: EntryKind -> Bool
 isFaulting (Faults _) = True
 isFaulting _ = False
 
@@ -112,7 +112,7 @@ becoming name value = momentOf ("becomes " ++ show value) (`elem` [Is (show valu
 remarked :: String -> Moment
 remarked text = (momentOf "is remarked" (== Remarked) text) {momentNames = []}
 
-momentOf :: String -> (Happening -> Bool) -> String -> Moment
+momentOf :: String -> (EntryKind -> Bool) -> String -> Moment
 momentOf verb isIt name =
   Moment
     { momentWords = show name ++ " " ++ verb
@@ -120,10 +120,10 @@ momentOf verb isIt name =
     , occurrences = filter $ \(_, entry) -> entry `isAbout` name && isIt (happening entry)
     }
 
-isAbout :: Entry -> String -> Bool
+isAbout :: RecordEntry -> String -> Bool
 isAbout entry name = name `elem` [subject entry, fullName entry]
 
-isEnd :: Happening -> Bool
+isEnd :: EntryKind -> Bool
 isEnd what = case what of
   Succeeds -> True
   Fails _ -> True
@@ -167,7 +167,7 @@ merged xs ys = xs ++ ys
 --     ...
 --
 -- @since 0.1.0.0
-during :: Moment -> Stretch -> Moment
+during :: Moment -> Interval -> Moment
 during = restricted "while" id
 
 -- | Those that happen while something does not go on.
@@ -176,10 +176,10 @@ during = restricted "while" id
 -- True
 --
 -- @since 0.1.0.0
-outside :: Moment -> Stretch -> Moment
+outside :: Moment -> Interval -> Moment
 outside = restricted "unless" not
 
-restricted :: String -> (Bool -> Bool) -> Moment -> Stretch -> Moment
+restricted :: String -> (Bool -> Bool) -> Moment -> Interval -> Moment
 restricted word wanted m s =
   Moment
     { momentWords = momentWords m ++ " " ++ word ++ " " ++ spanWords s
@@ -197,7 +197,7 @@ restricted word wanted m s =
 -- True
 --
 -- @since 0.1.0.0
-overlapping :: Stretch -> Stretch -> Moment
+overlapping :: Interval -> Interval -> Moment
 overlapping a b =
   (anyOf [starts a `during` b, starts b `during` a]) {momentWords = spanWords a ++ " while " ++ spanWords b}
  where
@@ -222,7 +222,7 @@ numbered = zip [0 ..] . entries
 -- | What goes on for a while.
 --
 -- @since 0.1.0.0
-data Stretch = Stretch
+data Interval = Interval
   { spanWords :: String
   , spanNames :: [String]
   , stretches :: Lines -> [(Int, Int)]
@@ -232,25 +232,25 @@ data Stretch = Stretch
 -- | The action runs: from its beginning to its end, cleanup included.
 --
 -- @since 0.1.0.0
-running :: String -> Stretch
+running :: String -> Interval
 running name =
-  Stretch (show name ++ " is running") [name] $
+  Interval (show name ++ " is running") [name] $
     stretchesFrom (\e -> e `isAbout` name && happening e == Begins) $ \begun e ->
       fullName e == fullName begun && call e == call begun && isEnd (happening e)
 
 -- | The condition, or what the sensor reads, is this.
 --
 -- @since 0.1.0.0
-being :: Show a => String -> a -> Stretch
+being :: Show a => String -> a -> Interval
 being name value =
-  Stretch (show name ++ " is " ++ show value) [name] $
+  Interval (show name ++ " is " ++ show value) [name] $
     stretchesFrom (\e -> e `isAbout` name && happening e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
       e `isAbout` name && changes (happening e)
  where
   changes (Becomes _) = True
   changes what = what == LosesItsValue
 
-stretchesFrom :: (Entry -> Bool) -> (Entry -> Entry -> Bool) -> Lines -> [(Int, Int)]
+stretchesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Lines -> [(Int, Int)]
 stretchesFrom begins ends rows =
   [ (from, fromMaybe maxBound (listToMaybe [to | (to, e) <- drop (from + 1) rows, ends entry e]))
   | (from, entry) <- rows

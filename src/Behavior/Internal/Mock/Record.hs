@@ -6,8 +6,8 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Record
   ( Record (..)
-  , Entry (..)
-  , Happening (..)
+  , RecordEntry (..)
+  , EntryKind (..)
   , recorded
   , fullName
   , timeline
@@ -25,7 +25,7 @@ import Behavior.Internal.Runtime (Seconds)
 data Record = Record
   { subjects :: [String]
   -- ^ The names of all that is in the world, whether or not anything became of it.
-  , entries :: [Entry]
+  , entries :: [RecordEntry]
   -- ^ What has happened, in order.
   }
   deriving (Eq)
@@ -36,7 +36,7 @@ instance Show Record where
 -- | One thing that has happened.
 --
 -- @since 0.1.0.0
-data Entry = Entry
+data RecordEntry = RecordEntry
   { happenedAt :: Seconds
   -- ^ When: in seconds since the clock of the world was started.
   , subject :: String
@@ -45,12 +45,12 @@ data Entry = Entry
   -- ^ The argument, shown, of an action that has one; else nothing.
   , call :: Int
   -- ^ Which call of the action (with this argument) it belongs to, from 1.
-  , happening :: Happening
+  , happening :: EntryKind
   }
   deriving (Eq)
 
 -- | Without the time: a line of a schedule, say, has that already.
-instance Show Entry where
+instance Show RecordEntry where
   show entry = fullName entry ++ told (happening entry) ++ again
    where
     told what = case what of
@@ -71,7 +71,7 @@ instance Show Entry where
 -- | What can happen to the things of a mock world.
 --
 -- @since 0.1.0.0
-data Happening
+data EntryKind
   = -- | An action begins.
     Begins
   | -- | An action returns its result.
@@ -97,17 +97,17 @@ data Happening
 -- | A record of what was noted, the newest first. A thread notes its time and then
 -- the entry, so that entries of several threads can be noted in another order than
 -- that of their times. Entries of one moment stay in the order of the noting.
-recorded :: [String] -> [Entry] -> Record
+recorded :: [String] -> [RecordEntry] -> Record
 recorded names = Record names . sortOn happenedAt . reverse
 
 -- | The name of whom an entry is about, with the argument if there is one.
-fullName :: Entry -> String
+fullName :: RecordEntry -> String
 fullName entry
   | null (argument entry) = subject entry
   | otherwise = subject entry ++ " " ++ argument entry
 
 -- | The lines of a timeline.
-timeline :: [Entry] -> [String]
+timeline :: [RecordEntry] -> [String]
 timeline lines' = [padded (inSeconds (happenedAt entry)) ++ "  " ++ show entry | entry <- lines']
  where
   padded time = replicate (width - length time) ' ' ++ time

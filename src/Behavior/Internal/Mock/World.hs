@@ -52,9 +52,9 @@ data Mock = Mock
   , elapsed :: IORef (IO Seconds)
   -- ^ How long it has gone in a simulation, until that ended; in reality this is zero.
   , names :: IORef [String]
-  , noted :: IORef [Entry]
+  , noted :: IORef [RecordEntry]
   -- ^ Newest first.
-  , unseen :: IORef [Seconds -> STM [Entry]]
+  , unseen :: IORef [Seconds -> STM [RecordEntry]]
   -- ^ The changes until then that were due, but that nobody has seen yet.
   }
 
@@ -85,7 +85,7 @@ clock mock = do
 
 -- | Notes, which nothing can block or interrupt where exceptions are masked. When the run
 -- has ended, the record has.
-tell :: Mock -> Entry -> IO ()
+tell :: Mock -> RecordEntry -> IO ()
 tell mock entry = do
   goesOn <- isRecorded
   when goesOn $ do
@@ -101,7 +101,7 @@ tell mock entry = do
 remark :: Mock -> String -> Behavior ()
 remark mock text = do
   (zero, t) <- clock mock
-  mask_ $ tell mock (Entry (t - zero) text "" 1 Remarked)
+  mask_ $ tell mock (RecordEntry (t - zero) text "" 1 Remarked)
 
 -- | Gives a thing of the world its name, which must not be another one's.
 christen :: Mock -> String -> String -> IO ()
@@ -113,7 +113,7 @@ christen mock kind name = do
 
 -- | Has changes put on record (of those that were due by a given time) that nobody
 -- has seen.
-foretell :: Mock -> (Seconds -> STM [Entry]) -> IO ()
+foretell :: Mock -> (Seconds -> STM [RecordEntry]) -> IO ()
 foretell mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
 
 -- | All that has happened until now. A change of a condition is on record once

@@ -8,7 +8,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Explore
   ( explore
-  , exploring
+  , tryExplore
   ) where
 
 import Control.Exception hiding (Deadlock)
@@ -72,27 +72,27 @@ data Trial = Trial
 -- @since 0.1.0.0
 explore :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Report
 explore plan property =
-  exploring plan property >>= \case
+  tryExplore plan property >>= \case
     Left counterexample -> throwIO counterexample
     Right report -> pure report
 
 -- | 'explore' that gives the counterexample.
 --
--- >>> found <- exploring (exhaustively 1) (\simulate -> simulate (sleep 1) >>= \run -> if finished run > 0 then fail "late" else pure ())
+-- >>> found <- tryExplore (exhaustively 1) (\simulate -> simulate (sleep 1) >>= \run -> if finished run > 0 then fail "late" else pure ())
 -- >>> either failing (error . show) found
--- Switching []
+-- Preempting []
 --
 -- @since 0.1.0.0
-exploring
+tryExplore
   :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
-exploring plan property = case search plan of
+tryExplore plan property = case search plan of
   Random n seed -> randomSearch n seed
   Exhaustive k limit -> fullSearch k limit
   Replay s -> only s $ \e t ->
-    pure Counterexample {failing = s, because = e, story = happened t, foundAfter = 1, foundBy = plan}
+    pure Counterexample {failing = s, reason = e, failingSteps = happened t, schedulesTried = 1, foundBy = plan}
   Shrink s -> only s (reduced 1)
  where
-  o = under plan
+  o = runOptions plan
   try' chooser' = attempting o chooser' property
 
   only s onFailure = do
@@ -137,7 +137,7 @@ exploring plan property = case search plan of
     (fewest, e'') <- simplest fewer e'
     again <- attempting o {detailed = True} (switching True fewest) property
     let why = fromMaybe (toException (Unrepeatable (showException plan e''))) (thrown again)
-    pure Counterexample {failing = Switching fewest, because = why, story = happened again, foundAfter = i, foundBy = plan}
+    pure Counterexample {failing = Preempting fewest, reason = why, failingSteps = happened again, schedulesTried = i, foundBy = plan}
 
   -- To leave out one switch moves what comes after it, so that the others may miss their
   -- points. So it looks afresh, the schedules with the fewest switches first. What is
@@ -187,14 +187,14 @@ attempting o choosing property = do
             chooser' <- choosing
             run <- simulateBy o chooser' act
             let switched = case schedule run of
-                  Switching s -> s
+                  Preempting s -> s
                   _ -> []
             writeIORef made (Just (switched, steps run, points run))
             case outcome run of
-              Outside _ _ -> improper run
-              Meddled _ -> improper run
+              BlockedOutside _ _ -> improper run
+              ExternalWakeup _ -> improper run
               TooSlow _ _ -> improper run
-              Misfit _ -> improper run
+              ScheduleMismatch _ -> improper run
               _ -> pure run
       improper run = throwIO (ErrorCall (explain (outcome run)))
   end <- try (property simulating)

@@ -111,7 +111,7 @@ settled sim me all' = do
   for_ gone $ \p -> do
     untilOver p
     writeIORef (released p) True
-    noteStep sim (Hears (legible (show (thrown p))))
+    noteStep sim (ReceivesException (legible (show (thrown p))))
     wakeSender sim p
  where
   partitionM test list = do

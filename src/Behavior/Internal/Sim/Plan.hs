@@ -30,12 +30,12 @@ import Behavior.Internal.Sim.Types
 -- | Which schedules to run, and how. Begin with one of 'randomly', 'exhaustively' and
 -- 'replaying', and change what should be different:
 --
--- >>> let plan = (randomly 1000) {search = Random 1000 7, under = defaults {endAt = 60}}
+-- >>> let plan = (randomly 1000) {search = Random 1000 7, runOptions = defaults {endAt = 60}}
 --
 -- @since 0.1.0.0
 data Plan = Plan
   { search :: Search
-  , under :: Options
+  , runOptions :: Options
   -- ^ Its 'scheduled' is not looked at.
   , showException :: SomeException -> String
   -- ^ How the text of a 'Counterexample' shows what the property threw; by default with
@@ -46,7 +46,7 @@ data Plan = Plan
 
 -- | The search under the options, and the defaults.
 plan :: Search -> Options -> Plan
-plan s o = Plan {search = s, under = o, showException = text, selectSteps = id}
+plan s o = Plan {search = s, runOptions = o, showException = text, selectSteps = id}
 
 -- | Which schedules to run.
 --
@@ -98,7 +98,7 @@ replaying s = plan (Replay s) defaults {detailed = True}
 --
 -- @since 0.1.0.0
 endingAt :: Plan -> Seconds -> Plan
-endingAt whole end = whole {under = (under whole) {endAt = end}}
+endingAt whole end = whole {runOptions = (runOptions whole) {endAt = end}}
 
 -- | What was explored.
 --
@@ -125,11 +125,11 @@ instance Show Report where
 -- @since 0.1.0.0
 data Counterexample = Counterexample
   { failing :: Schedule
-  , because :: SomeException
+  , reason :: SomeException
   -- ^ What the property threw.
-  , story :: [Step]
+  , failingSteps :: [Step]
   -- ^ What happened, in detail.
-  , foundAfter :: Int
+  , schedulesTried :: Int
   -- ^ How many schedules were run until one failed.
   , foundBy :: Plan
   -- ^ How it was found, and how its text shows it.
@@ -139,8 +139,8 @@ instance Show Counterexample where
   show c =
     intercalate
       "\n"
-      [ "schedule " ++ show (foundAfter c) ++ " fails:"
-      , indented (showException (foundBy c) (because c))
+      [ "schedule " ++ show (schedulesTried c) ++ " fails:"
+      , indented (showException (foundBy c) (reason c))
       , renderSchedule c
       ]
    where
@@ -151,11 +151,11 @@ instance Exception Counterexample
 -- | The text of a counterexample without what the property threw: the schedule, what
 -- happened, and how to replay it.
 --
--- >>> found <- exploring (exhaustively 1) (\simulate -> simulate (sleep 1) >> fail "always")
+-- >>> found <- tryExplore (exhaustively 1) (\simulate -> simulate (sleep 1) >> fail "always")
 -- >>> either (putStrLn . renderSchedule) print found
 -- shrunk to the undisturbed schedule, this happens:
 --      0.000 s  0 main  sleeps until 1.000 s
--- to see it again: explore (replaying (Switching []))
+-- to see it again: explore (replaying (Preempting []))
 --
 -- @since 0.1.0.0
 renderSchedule :: Counterexample -> String
@@ -163,16 +163,16 @@ renderSchedule c =
   intercalate
     "\n"
     [ schedule' ++ ", this happens" ++ omission ++ ":"
-    , dropWhileEnd (== '\n') (narrate selected)
+    , dropWhileEnd (== '\n') (renderSteps selected)
     , "to see it again: explore (replaying (" ++ show (failing c) ++ "))"
     ]
  where
-  selected = selectSteps (foundBy c) (story c)
+  selected = selectSteps (foundBy c) (failingSteps c)
   omission
-    | length selected == length (story c) = ""
-    | otherwise = " (" ++ show (length selected) ++ " of " ++ show (length (story c)) ++ " steps)"
+    | length selected == length (failingSteps c) = ""
+    | otherwise = " (" ++ show (length selected) ++ " of " ++ show (length (failingSteps c)) ++ " steps)"
   schedule' = case failing c of
-    Switching [] -> "shrunk to the undisturbed schedule"
-    Switching [_] -> "shrunk to one switch"
-    Switching several -> "shrunk to " ++ show (length several) ++ " switches"
+    Preempting [] -> "shrunk to the undisturbed schedule"
+    Preempting [_] -> "shrunk to one switch"
+    Preempting several -> "shrunk to " ++ show (length several) ++ " switches"
     other -> "under the schedule " ++ show other

@@ -46,11 +46,11 @@ data Policy = Policy
 
 -- | The policy that a schedule stands for.
 policy :: Schedule -> IO Policy
-policy Undisturbed = switching True []
-policy (Switching exceptions) = switching True exceptions
+policy NonPreemptive = switching True []
+policy (Preempting exceptions) = switching True exceptions
 policy (Seeded seed) = random seed
 
--- | Undisturbed but for some exceptions. Those that do not fit are refused, or (when the
+-- | The non-preemptive schedule but for some exceptions. Those that do not fit are refused, or (when the
 -- schedule is being shrunk) left out.
 switching :: Bool -> [(Int, Int)] -> IO Policy
 switching strictly exceptions = do

@@ -7,7 +7,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Report
   ( explain
-  , narrate
+  , renderSteps
   , ofThreads
   , mentioning
   , text
@@ -46,16 +46,16 @@ explain = \case
   Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
   Livelock labels -> "livelock: the virtual time stands still while these run on and on: " ++ commas labels
   OutOfTime -> "the virtual time has come to the end that was set"
-  Outside label' blocked -> show label' ++ " waited outside of the simulation, " ++ instead blocked
-  Meddled waiting ->
+  BlockedOutside label' blocked -> show label' ++ " waited outside of the simulation, " ++ instead blocked
+  ExternalWakeup waiting ->
     listed
       "something outside of the simulation changed what these waited for (a thread of forkIO or async? \
       \start it by parallel, both or fork)"
       waiting
   TooSlow label' (Seconds t) ->
     show label' ++ " ran when the limit of real time was reached, at " ++ showFFloat (Just 3) t " s of virtual time: \
-      \it computes for very long, or for ever (see patience), or the behaviour has no end (see endAt)"
-  Misfit why -> "the schedule does not fit this behaviour: " ++ why
+      \it computes for very long, or for ever (see realTimeLimit), or the behaviour has no end (see endAt)"
+  ScheduleMismatch why -> "the schedule does not fit this behaviour: " ++ why
 
 listed :: String -> [Waiting] -> String
 listed title = intercalate "\n  " . (title :) . map (\(Waiting who' what') -> show who' ++ " waits for " ++ what')
@@ -71,7 +71,7 @@ instead = \case
     \use Behavior.Time.atomically, parallel, both, fork"
   InThunk ->
     "for a value that another thread is computing (it was lazy, and to compute it waits, \
-    \or takes longer than patience): compute it before, by evaluate"
+    \or takes longer than realTimeLimit): compute it before, by evaluate"
   InThrowing others ->
     listed
       "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork; \
@@ -85,7 +85,7 @@ instead = \case
 -- time, the number and the label of the thread, and what it did.
 --
 -- >>> run <- simulate (parallel (sleep 1) (sleep 2))
--- >>> putStr (narrate (steps run))
+-- >>> putStr (renderSteps (steps run))
 --      0.000 s  1 parallel: left   starts
 --      0.000 s  2 parallel: right  starts
 --      1.000 s  1 parallel: left   ends
@@ -96,7 +96,7 @@ instead = \case
 -- operators can be told apart, whatever their labels are:
 --
 -- >>> run <- simulate (parallel (parallel (sleep 1) (sleep 1)) (parallel (sleep 1) (sleep 1)))
--- >>> putStr (narrate (take 6 (steps run)))
+-- >>> putStr (renderSteps (take 6 (steps run)))
 --      0.000 s  1 parallel: left          starts
 --      0.000 s  2 parallel: right         starts
 --      0.000 s  3 parallel: left (of 1)   starts
@@ -105,8 +105,8 @@ instead = \case
 --      0.000 s  6 parallel: right (of 2)  starts
 --
 -- @since 0.1.0.0
-narrate :: [Step] -> String
-narrate made = unlines (concatMap (map line . take 1) (groupBy repeated made))
+renderSteps :: [Step] -> String
+renderSteps made = unlines (concatMap (map line . take 1) (groupBy repeated made))
  where
   repeated s t = (at s, number s, did s) == (at t, number t, did t)
   line s =
@@ -123,7 +123,7 @@ thread s = show (number s) ++ " " ++ show (label s) ++ (if parentNumber s > 0 th
 -- | Only the steps of the threads with these numbers.
 --
 -- >>> run <- simulate (parallel (sleep 1) (sleep 2))
--- >>> putStr (narrate (ofThreads [1] (steps run)))
+-- >>> putStr (renderSteps (ofThreads [1] (steps run)))
 --      0.000 s  1 parallel: left  starts
 --      1.000 s  1 parallel: left  ends
 --
@@ -135,7 +135,7 @@ ofThreads numbers = filter ((`elem` numbers) . number)
 -- of what it did, such as the name of an action or a condition.
 --
 -- >>> run <- simulate (parallel (sleep 1) (sleep 2))
--- >>> putStr (narrate (mentioning ["left", "interrupted"] (steps run)))
+-- >>> putStr (renderSteps (mentioning ["left", "interrupted"] (steps run)))
 --      0.000 s  1 parallel: left   starts
 --      1.000 s  1 parallel: left   ends
 --      1.000 s  2 parallel: right  is interrupted: Stop: the operator that started this behaviour no longer wants it
@@ -145,12 +145,12 @@ mentioning :: [String] -> [Step] -> [Step]
 mentioning texts = filter (\s -> any (`isInfixOf` (thread s ++ "  " ++ aside (did s))) texts)
 
 -- | What a thread did, in words.
-aside :: Did -> String
+aside :: StepKind -> String
 aside = \case
   Starts -> "starts"
   Ends -> "ends"
-  Says what' -> what'
-  Hears e -> "is interrupted: " ++ e
+  Note what' -> what'
+  ReceivesException e -> "is interrupted: " ++ e
   Throws n target -> "asks " ++ show n ++ " " ++ show target ++ " to stop"
   Transacts -> "transaction"
   Sleeps (Seconds t)

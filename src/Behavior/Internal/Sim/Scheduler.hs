@@ -64,7 +64,7 @@ simulation sim =
     , record = \event -> settle sim >> case event of
         Started _ -> noteStep sim Starts
         Ended _ -> pure () -- It ends when that is known: see 'leave'.
-        Noted text -> noteStep sim (Says text)
+        Noted text -> noteStep sim (Note text)
     }
  where
   -- One that has ended hears nothing.
@@ -181,7 +181,7 @@ arrive sim me = do
         Nothing -> pure ()
         Just e -> do
           writeIORef (raised me) Nothing
-          noteStep sim (Hears (legible (show e)))
+          noteStep sim (ReceivesException (legible (show e)))
           throwIO e
 
 -- | The end of a task is an operation too.

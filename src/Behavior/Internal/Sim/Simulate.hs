@@ -108,9 +108,9 @@ simulateBy o chooser' act = do
             { outcome = outcomeOf v end rest
             , finished = time'
             , steps = made
-            , schedule = Switching switches
+            , schedule = Preempting switches
             , points = count
-            , leftRunning = left
+            , leakedThreads = left
             }
 
 simulationNumber :: IORef Int
@@ -121,13 +121,13 @@ simulationNumber = unsafePerformIO (newIORef 0)
 outcomeOf :: Maybe (Outcome Void) -> Maybe (Either SomeException a) -> [(Int, Int)] -> Outcome a
 outcomeOf cutOff end rest = case (cutOff, rest, end) of
   (Just other, _, _) -> absurd <$> other
-  (Nothing, (p, thread) : _, _) -> Misfit ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
+  (Nothing, (p, thread) : _, _) -> ScheduleMismatch ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
   (Nothing, [], Just (Right a)) -> Returned a
   (Nothing, [], Just (Left e))
     | isFailure e -> Failing e
     | isCancellation e -> Cancelled e
     | otherwise -> Faulting e
-  (Nothing, [], Nothing) -> Misfit "unreachable"
+  (Nothing, [], Nothing) -> ScheduleMismatch "unreachable"
 
 -- | Ends all tasks, the youngest first, one at a time.
 unwind :: Sim -> Either SomeException (Maybe (Outcome Void)) -> IO ()
@@ -142,7 +142,7 @@ unwind sim verdict = do
   -- Whoever ran has the turn still.
   keptTurn = case verdict of
     Left _ -> True
-    Right (Just (Outside _ _)) -> True
+    Right (Just (BlockedOutside _ _)) -> True
     Right (Just (TooSlow _ _)) -> True
     Right _ -> False
 

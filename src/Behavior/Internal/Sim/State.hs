@@ -209,7 +209,7 @@ committed sim = do
   writeIORef (commits sim) $! n + 1
 
 -- | Puts what the task that has the turn did on record.
-noteStep :: Sim -> Did -> IO ()
+noteStep :: Sim -> StepKind -> IO ()
 noteStep sim what' = do
   me <- readIORef (current sim)
   t <- readIORef (time sim)
@@ -217,6 +217,6 @@ noteStep sim what' = do
   modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) (parent me) what' :)
 
 -- | Likewise, if the record is to be detailed.
-detail :: Sim -> Did -> IO ()
+detail :: Sim -> StepKind -> IO ()
 detail sim what' = when (detailed (options sim)) (noteStep sim what')
 {-# INLINE detail #-}

@@ -38,7 +38,7 @@ choose sim me = do
   rotating <- (n >=) <$> readIORef (rotateAt sim)
   case Map.lookupMin able of
     Nothing -> timeMoves sim >>= \hope -> if hope then choose sim me else pure Nothing
-    _ | n - moved > standstill (options sim) -> finishing (Livelock (map taskLabel (Map.elems able)))
+    _ | n - moved > livelockLimit (options sim) -> finishing (Livelock (map taskLabel (Map.elems able)))
     Just (first, only)
       | Map.size able == 1 -> run n rotating only
       | otherwise -> do
@@ -88,7 +88,7 @@ decided sim n usually goesOn able = do
         , candidateAt = \k -> fst (Map.elemAt k able)
         }
   case chosen >>= \k -> maybe (Left "no such thread") Right (Map.lookup k able) of
-    Left why -> Nothing <$ conclude sim (Just (Misfit why))
+    Left why -> Nothing <$ conclude sim (Just (ScheduleMismatch why))
     Right task -> do
       when (taskNumber task /= usually) (modifyIORef' (taken sim) ((n, taskNumber task) :))
       pure (Just task)
@@ -107,7 +107,7 @@ timeMoves sim = do
       | otherwise -> do
           disturbed <- meddled (5 :: Int)
           who' <- waitings sim (const True)
-          finishing (if disturbed then Meddled who' else Deadlock who')
+          finishing (if disturbed then ExternalWakeup who' else Deadlock who')
  where
   end = endAt (options sim)
   infinite (Seconds s) = isInfinite s

@@ -17,7 +17,7 @@ module Behavior.Internal.Sim.Types
   , Waiting (..)
   , Blocked (..)
   , Step (..)
-  , Did (..)
+  , StepKind (..)
   ) where
 
 import Control.Exception (SomeException)
@@ -34,10 +34,10 @@ data Options = Options
   , endAt :: Seconds
   -- ^ The virtual time at which the run is stopped ('OutOfTime'), also if by then no thread
   -- can do anything any more; infinite by default.
-  , standstill :: Int
+  , livelockLimit :: Int
   -- ^ After so many scheduling points without progress of the virtual time the run is
   -- stopped ('Livelock'); 100,000 by default.
-  , patience :: Seconds
+  , realTimeLimit :: Seconds
   -- ^ After so much real time the run is stopped ('TooSlow'); 9 s by default.
   , slip :: Seconds
   -- ^ A sleeper may be late by less than this: whenever time moves, the schedule may let it
@@ -54,10 +54,10 @@ data Options = Options
 defaults :: Options
 defaults =
   Options
-    { scheduled = Undisturbed
+    { scheduled = NonPreemptive
     , endAt = 1 / 0
-    , standstill = 100000
-    , patience = 9
+    , livelockLimit = 100000
+    , realTimeLimit = 9
     , slip = 0
     , detailed = False
     }
@@ -68,10 +68,10 @@ defaults =
 data Schedule
   = -- | A thread runs until it has to wait; then it is the turn of the next that can run,
     -- round and round.
-    Undisturbed
+    NonPreemptive
   | -- | The undisturbed one but for some exceptions: at the scheduling point of this
     -- number, this thread runs. What 'Behavior.Sim.explore' prints is of this form.
-    Switching [(Int, Int)]
+    Preempting [(Int, Int)]
   | -- | A random one: the same number, the same schedule.
     Seeded Int
   deriving (Eq, Show, Read)
@@ -89,7 +89,7 @@ data Run a = Run
   -- ^ Replays this very run: a 'Switching'.
   , points :: Int
   -- ^ How many scheduling points it had.
-  , leftRunning :: [Label]
+  , leakedThreads :: [Label]
   -- ^ The threads that had not ended when the behaviour had.
   }
 
@@ -112,13 +112,13 @@ data Outcome a
   | -- | The virtual time came to 'endAt'.
     OutOfTime
   | -- | This thread waited for something that is not this library's.
-    Outside Label Blocked
+    BlockedOutside Label Blocked
   | -- | Something that is not part of the simulation changed what these threads waited for.
-    Meddled [Waiting]
+    ExternalWakeup [Waiting]
   | -- | The real time came to 'patience', while this thread ran; the virtual time was this.
     TooSlow Label Seconds
   | -- | The schedule is not one of this behaviour: why not.
-    Misfit String
+    ScheduleMismatch String
   deriving (Functor)
 
 -- | Who waits for what.
@@ -159,19 +159,19 @@ data Step = Step
   , label :: !Label
   , parentNumber :: !Int
   -- ^ The number of the thread that started it; of the first thread it is -1.
-  , did :: Did
+  , did :: StepKind
   }
   deriving (Eq, Show)
 
 -- | What a thread did, or what was done to it.
 --
 -- @since 0.1.0.0
-data Did
+data StepKind
   = Starts
   | Ends
-  | Says String
+  | Note String
   | -- | An exception arrived that another thread had thrown to it.
-    Hears String
+    ReceivesException String
   | -- | The last four only in a detailed run. It throws an exception to this thread.
     Throws Int Label
   | -- | It runs a transaction.

@@ -85,7 +85,7 @@ look sim before = do
       | t - since sight > allowed -> do
           came <- readIORef (time sim)
           let verdict
-                | status == ThreadBlocked BlockedOnBlackHole = Outside (taskLabel runner) InThunk
+                | status == ThreadBlocked BlockedOnBlackHole = BlockedOutside (taskLabel runner) InThunk
                 | otherwise = TooSlow (taskLabel runner) came
               hopeless = t - since sight > allowed + 5
           when (hopeless && not (warned sight)) (warn runner)
@@ -97,10 +97,10 @@ look sim before = do
           when (waits seen >= 400) (void (tryPutMVar (back sim) ()))
           if waits seen < 100
             then pure seen
-            else waitings sim ((/= taskNumber runner) . taskNumber) >>= tell seen . Outside (taskLabel runner) . how
+            else waitings sim ((/= taskNumber runner) . taskNumber) >>= tell seen . BlockedOutside (taskLabel runner) . how
       | otherwise -> pure sight {atPoint = n, waits = 0}
  where
-  Seconds allowed = patience (options sim)
+  Seconds allowed = realTimeLimit (options sim)
   tell sight verdict = do
     unless (told sight) (void (tryPutMVar (over sim) (Just verdict)))
     pure sight {told = True}
@@ -127,7 +127,7 @@ blocked (ThreadBlocked reason) = case reason of
   _ -> Nothing
 blocked _ = Nothing
 
--- | Says why the process hangs, perhaps: one that does not allocate does not hear that it should
+-- | Note why the process hangs, perhaps: one that does not allocate does not hear that it should
 -- stop, and GHC's next garbage collection waits for it.
 warn :: Task -> IO ()
 warn runner = do

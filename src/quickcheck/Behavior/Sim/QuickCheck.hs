@@ -116,13 +116,13 @@ underSchedule body drawn = ioRose $ do
     -- The property may simulate again when it is shrunk, which is after the exploration.
     let simulateBy explored act = maybe (explored act) (later act) =<< readIORef over
         later act chosen = do
-          run <- simulateWith (under plan) {scheduled = chosen} act
+          run <- simulateWith (runOptions plan) {scheduled = chosen} act
           -- What was shrunk need not fit the schedule.
           when (isMisfit (outcome run)) discard
-          modifyIORef shown (fmap (\c -> c {story = steps run}))
+          modifyIORef shown (fmap (\c -> c {failingSteps = steps run}))
           pure run
         plan = (replaying drawn) {search = how}
-    found <- exploring plan $ \explored -> do
+    found <- tryExplore plan $ \explored -> do
       rose@(MkRose result _) <- reduceRose (ioRose (body (simulateBy explored)))
       writeIORef latest rose
       for_ (theException result) $ \e -> when (isCancellation e) (throwIO e)
@@ -130,7 +130,7 @@ underSchedule body drawn = ioRose $ do
     writeIORef over (Just (either failing (const drawn) found))
     writeIORef shown (either Just (const Nothing) found)
     readIORef latest >>= explained shown
-  isMisfit (Misfit _) = True
+  isMisfit (ScheduleMismatch _) = True
   isMisfit _ = False
   isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 
@@ -163,8 +163,8 @@ anySchedule = Seeded <$> chooseAny
 --
 -- @since 0.1.0.0
 shrinkSchedule :: Schedule -> [Schedule]
-shrinkSchedule (Switching switches) = Switching <$> shrinkList (const []) switches
-shrinkSchedule _ = [Undisturbed]
+shrinkSchedule (Preempting switches) = Preempting <$> shrinkList (const []) switches
+shrinkSchedule _ = [NonPreemptive]
 
 -- | Two durations that are often the same.
 --
