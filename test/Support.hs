@@ -77,7 +77,7 @@ import Behavior
   , behaviorFailedToException
   )
 import Behavior.Internal.Failure (isCancellation, isFailure)
-import Behavior.Internal.Runtime (atomically, living)
+import Behavior.Internal.Runtime (atomically, liveThreadCount)
 
 -- | Every spec as a whole goes in here: each example must be over within twenty
 -- seconds (of which it needs one at the most, unless the machine is very busy), and
@@ -107,9 +107,9 @@ within seconds act = do
 -- moment when it returns or throws, as lived before it.
 leavingNothing :: IO a -> IO a
 leavingNothing act = mask $ \restore -> do
-  before <- living
+  before <- liveThreadCount
   end <- try (restore act)
-  after <- living
+  after <- liveThreadCount
   unless (after == before) . expectationFailure $
     show (after - before) ++ " threads were left running"
   either (\(e :: SomeException) -> throwIO e) pure end

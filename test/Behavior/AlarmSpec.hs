@@ -202,7 +202,7 @@ many = do
   prop "nobody waits at a gate that is farther away than he has slept, or than a second" $
     forAll ((,) <$> choose (0, maxBound `div` 4) <*> oneof [choose (1, 100000), choose (1, maxBound `div` 4)]) $ \(from, long) ->
       let end = from + long
-          gates = takeWhile (< end) (take 100 (iterate (nextGate from end) from)) ++ [end]
+          gates = takeWhile (< end) (take 100 (iterate (nextBucket from end) from)) ++ [end]
           far = [gate - t | (t, gate) <- zip gates (drop 1 gates), gate - t > max second (t - from)]
        in counterexample (show gates) $ far === [] .&&. length gates < 64
  where

@@ -15,7 +15,7 @@ import Test.Hspec
 
 import Behavior (Failed)
 import Behavior.Internal.Runtime (atomically, now)
-import Behavior.Internal.Scope (SomeBranch (..), ask, outcome, structured)
+import Behavior.Internal.Scope (SomeBranch (..), requestStopAsync, outcome, structured)
 import Behavior.Internal.Source (startSensors)
 import qualified Behavior.Internal.Source as Source
 import qualified Behavior.Signal as Signal
@@ -208,7 +208,7 @@ stale = do
       pass entered
       began <- atomically reading
       began `shouldSatisfy` isJust
-      ask (map SomeBranch workers)
+      requestStopAsync (map SomeBranch workers)
       for_ workers (atomically . outcome)
       _ <- startSensors scope "test" source
       atomically reading >>= (`shouldSatisfy` (/= began))

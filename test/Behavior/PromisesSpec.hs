@@ -13,7 +13,7 @@ import System.Mem (performMajorGC)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), atomically, firmly, reportingTo)
+import Behavior.Internal.Runtime (Event (..), atomically, awaitUninterruptibly, withSink)
 import Places
 import Support
 
@@ -140,7 +140,7 @@ cancelled = do
       pass inside
       throwTo (asyncThreadId caller) theCancel
       -- This thread is deadlocked as well.
-      end <- endingOf <$> firmly (atomically (waitCatchSTM caller))
+      end <- endingOf <$> awaitUninterruptibly (atomically (waitCatchSTM caller))
       open recovered
       end `shouldBe` isCancelled
       notes notebook `shouldReturn` ["recovered"]
@@ -166,7 +166,7 @@ branches = do
 
   inEach threaded "is labelled with its operator and its name, and is reported when it starts and ends" $ \place -> do
     (_, events) <- observing $ \notebook ->
-      reportingTo (note notebook) (placed place (pure ()))
+      withSink (note notebook) (placed place (pure ()))
     let started = [label | Started label <- events]
         ended = [label | Ended label <- events]
     [label | label <- started, Just label == placeLabel place] `shouldSatisfy` ((== 1) . length)

@@ -22,7 +22,7 @@ import System.Posix.Signals
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, firmly, reportingTo)
+import Behavior.Internal.Runtime (Event (..), Label (..), atomically, awaitUninterruptibly, withSink)
 import Support
 
 spec :: Spec
@@ -33,7 +33,7 @@ spec = guarded . describe "runBehavior" $ do
     (runBehavior (throwIO (Fault "bug")) :: IO ()) `shouldThrow` (== Fault "bug")
 
   it "runs it in an unbound thread, labelled, and unmasked" $ do
-    (end, events) <- observing $ \notebook -> reportingTo (note notebook) $
+    (end, events) <- observing $ \notebook -> withSink (note notebook) $
       bound (mask_ (runBehavior ((,) <$> isCurrentThreadBound <*> getMaskingState)))
     end `shouldBe` Gave (False, Unmasked)
     events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
@@ -212,7 +212,7 @@ spec = guarded . describe "runBehavior" $ do
     let deadlock = open inside >> newEmptyMVar >>= takeMVar :: IO ()
     _ <- forkIO $ pass inside >> untilOpen found (performMajorGC >> yield)
     launching (runBehavior deadlock) $ \caller -> do
-      end <- endingOf <$> firmly (atomically (waitCatchSTM caller))
+      end <- endingOf <$> awaitUninterruptibly (atomically (waitCatchSTM caller))
       open found
       end `shouldBe` FaultedWith (show BlockedIndefinitelyOnMVar)
  where

@@ -18,7 +18,7 @@ import GHC.Conc.Sync (threadLabel)
 import Test.Hspec hiding (parallel)
 
 import Behavior (Failed (..), both, failed, parallel)
-import Behavior.Internal.Runtime hiding (note)
+import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly)
@@ -28,7 +28,7 @@ spec :: Spec
 spec = guarded $ do
   describe "start" starting
   describe "interrupt" interrupting
-  describe "reportingTo" reporting
+  describe "withSink" reporting
   describe "atomically" waiting
   describe "structured" scopes
   describe "StoppedWithFault" pairs
@@ -57,13 +57,13 @@ starting = do
       self `shouldNotBe` caller
 
   it "counts the thread among the living until it has ended, and no longer" $ do
-    before' <- living
+    before' <- liveThreadCount
     gate <- newGate
     thread <- mask_ (start label (pass gate))
-    living `shouldReturn` before' + 1
+    liveThreadCount `shouldReturn` before' + 1
     open gate
     _ <- atomically (threadEnd thread)
-    living `shouldReturn` before'
+    liveThreadCount `shouldReturn` before'
 
   it "labels the thread with its operator and branch" $ do
     show (Label "parallel" "left") `shouldBe` "parallel: left"
@@ -110,7 +110,7 @@ interrupting = do
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
     pass inside
-    interruptByMessengers (const (Cancel "thread")) [threadId thread]
+    throwToAll (const (Cancel "thread")) [threadId thread]
     open mayEnd
     end <- atomically (threadEnd thread)
     endingOf end `shouldBe` CancelledBy (show (Cancel "thread"))
@@ -119,7 +119,7 @@ interrupting = do
     thread <- mask_ (start label (pure 'a'))
     awaitOver (threadId thread)
     interrupt (threadId thread) (Cancel "thread")
-    interruptByMessengers (const (Cancel "thread")) [threadId thread]
+    throwToAll (const (Cancel "thread")) [threadId thread]
     end <- atomically (threadEnd thread)
     endingOf end `shouldBe` Gave 'a'
 
@@ -128,7 +128,7 @@ reporting = do
   it "reports the start and the end of each thread, in the thread itself, masked" $ do
     notebook <- newNotebook
     let sink event = (,,) event <$> myThreadId <*> getMaskingState >>= note notebook
-    thread <- reportingTo sink $ do
+    thread <- withSink sink $ do
       thread <- mask_ (start label (pure ()))
       thread <$ atomically (threadEnd thread)
     events <- notes notebook
@@ -137,15 +137,15 @@ reporting = do
     [state | (_, _, state) <- events] `shouldSatisfy` notElem Unmasked
 
   it "reports the end of a thread that throws" $ do
-    (_, events) <- observing $ \notebook -> reportingTo (note notebook) $ do
+    (_, events) <- observing $ \notebook -> withSink (note notebook) $ do
       thread <- mask_ (start label (failed :: IO ()))
       atomically (threadEnd thread)
     events `shouldBe` [Started label, Ended label]
 
   it "reports nothing after the action has ended, in whatever way" $ do
     (end, events) <- observing $ \notebook -> do
-      reportingTo (note notebook) (pure ())
-      _ <- ending (reportingTo (note notebook) failed)
+      withSink (note notebook) (pure ())
+      _ <- ending (withSink (note notebook) failed)
       thread <- mask_ (start label (pure ()))
       void (atomically (threadEnd thread))
     end `shouldBe` Gave ()
@@ -160,9 +160,9 @@ waiting = do
         throwTo (asyncThreadId caller) (Cancel "caller")
         awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "caller")) :: Ending ())
 
-  it "firmly cannot" $ do
+  it "awaitUninterruptibly cannot" $ do
     var <- newTVarIO False
-    launching (firmly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $ \caller -> do
+    launching (awaitUninterruptibly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $ \caller -> do
       awaitIdle (asyncThreadId caller)
       throwing (asyncThreadId caller) (Cancel "caller")
       stillRunning caller
@@ -218,7 +218,7 @@ scopes = do
         (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> asked >>= note notebook
         pass mayEnd
       pass inside
-      ask [SomeBranch started]
+      requestStopAsync [SomeBranch started]
       open mayEnd
       pure <$> atomically (outcome started)
     told `shouldBe` [False, True]
@@ -231,8 +231,8 @@ scopes = do
       started <- branch scope label $
         (open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note notebook "cleaned up") :: IO (Branch ())
       pass inside
-      ask [SomeBranch started]
-      ask [SomeBranch started]
+      requestStopAsync [SomeBranch started]
+      requestStopAsync [SomeBranch started]
       pass cleaning
       open mayEnd
       pure (pure ())
@@ -244,7 +244,7 @@ scopes = do
       mayEnd <- newGate
       started <- traverse (\inside -> branch scope label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) insides
       traverse_ pass insides
-      ask (map SomeBranch (started :: [Branch ()]))
+      requestStopAsync (map SomeBranch (started :: [Branch ()]))
       note notebook "asked"
       open mayEnd
       pure (pure ())
@@ -254,9 +254,9 @@ scopes = do
     structured $ \scope -> do
       well <- branch scope label (pure 'a')
       badly <- branch scope label (failed :: IO Char)
-      (settle =<< ended well) `shouldReturn` 'a'
-      (settle =<< atomically (outcome well)) `shouldReturn` 'a'
-      (settle =<< atomically (outcome badly)) `shouldThrow` (== Failed)
+      (outcomeToIO =<< awaitOutcome well) `shouldReturn` 'a'
+      (outcomeToIO =<< atomically (outcome well)) `shouldReturn` 'a'
+      (outcomeToIO =<< atomically (outcome badly)) `shouldThrow` (== Failed)
       pure (pure ())
 
   it "does not let a cancellation that comes while branches stop strike the caller's handlers" $ do

@@ -14,7 +14,7 @@ import Data.Traversable (for)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime (living)
+import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Parallel
 import Behavior.Time (atomically)
 import Support
@@ -42,9 +42,9 @@ spec = guarded $ do
 
   it "has started what was forked when fork returns" $
     scoped $ \nursery -> do
-      before' <- living
+      before' <- liveThreadCount
       _ <- fork nursery hang :: IO (Child ())
-      living `shouldReturn` before' + 1
+      liveThreadCount `shouldReturn` before' + 1
 
   it "lets what was forked fork in its turn, and everything end together" $ do
     (end, done) <- observing $ \notebook -> do

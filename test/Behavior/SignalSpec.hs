@@ -12,7 +12,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (ioProperty, (===))
 
 import Behavior (both, (?))
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, reportingTo)
+import Behavior.Internal.Runtime (Event (..), Label (..), atomically, withSink)
 import qualified Behavior.Signal as Signal
 import Support
 import Watched
@@ -94,7 +94,7 @@ several = do
 started :: IO a -> IO [Label]
 started act = do
   events <- newNotebook
-  _ <- reportingTo (note events) act
+  _ <- withSink (note events) act
   notes events >>= \all' -> pure [label | Started label <- all']
 
 sharing :: Spec

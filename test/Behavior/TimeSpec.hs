@@ -15,7 +15,7 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), reportingTo, sleepUntil)
+import Behavior.Internal.Runtime (Event (..), Label (..), withSink, sleepUntil)
 import Behavior.Internal.Seconds (duration, period)
 import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, simulate)
 import Behavior.Time
@@ -173,7 +173,7 @@ timeouts = do
       begun <- now
       let timeIsUp = (>= begun + 0.02) <$> now
           startingLate event = when (event == Started (Label "timeout" "clock")) (eventually timeIsUp)
-      reportingTo startingLate (timeout 0.02 hang) `shouldThrow` (== TimedOut 0.02)
+      withSink startingLate (timeout 0.02 hang) `shouldThrow` (== TimedOut 0.02)
       ended <- now
       -- (If the machine was too slow, that says nothing: then once more.)
       pure (ended < begun + 0.04)
@@ -184,7 +184,7 @@ timeouts = do
     atomically (readTVar var) `shouldReturn` 'b'
 
   it "labels its two threads, the branch and the clock" $ do
-    (_, events) <- observing $ \notebook -> reportingTo (note notebook) (timeout 3600 (pure ()))
+    (_, events) <- observing $ \notebook -> withSink (note notebook) (timeout 3600 (pure ()))
     [started | Started started <- events]
       `shouldMatchList` [Label "timeout" "branch", Label "timeout" "clock"]
 

@@ -31,7 +31,7 @@ import Data.Maybe (fromMaybe)
 import Test.Hspec (shouldBe)
 
 import Behavior (Behavior, Failed (..), failWith)
-import Behavior.Internal.Runtime (living)
+import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Time (atomically)
 import Event (Event (action, happening), Happening)
 import qualified Event
@@ -107,7 +107,7 @@ failing why _ = failWith why
 -- | Fails when a thread of the library is there, to watch something or to run the
 -- action in.
 unwatched :: World -> Behavior ()
-unwatched _ = living >>= \n -> when (n > 0) (failWith "somebody is watching")
+unwatched _ = liveThreadCount >>= \n -> when (n > 0) (failWith "somebody is watching")
 
 becomes :: Condition -> Bool -> World -> Behavior ()
 becomes condition value world = atomically (writeTVar (holds world condition) value)

@@ -23,7 +23,7 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 
 import Behavior (Behavior)
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, living, reportingTo)
+import Behavior.Internal.Runtime (Event (..), Label (..), atomically, liveThreadCount, withSink)
 import Behavior.Signal (Signal, watching)
 import Promises.Language (Language)
 import qualified Promises.Language as L
@@ -49,16 +49,16 @@ obeys :: Clause -> Stage -> Language -> Program -> IO ()
 obeys clause stage' language' (Program tree deeds state) = do
   theatre <- Theatre stage' language' <$> newTVarIO 0 <*> newJournal <*> newIORef Map.empty
   let caller = do
-        before <- living
+        before <- liveThreadCount
         end <- try (inState state (grow theatre tree))
-        after <- living
+        after <- liveThreadCount
         unless (before == after) $ complaint theatre Structure (show (after - before) ++ " threads were left running")
         case end of
           Left e | cancelledBy (endingOf (end :: Either SomeException Int)) -> throwIO e
           -- Whoever was cancelled and goes on waits for ever.
           _ -> if any (stopsIt . snd) deeds then hang else either throwIO pure end
       whole = calling stage' (atomically . writeTVar (weather theatre)) deeds caller
-  end <- (if clause == Labels then reportingTo (labelling theatre) else id) (run stage' whole)
+  end <- (if clause == Labels then withSink (labelling theatre) else id) (run stage' whole)
   case end of
     Gave outcome
       | cancelledBy outcome, not (any (stopsIt . snd) deeds) -> broken ("a cancellation that nobody sent: " ++ show outcome)

@@ -119,7 +119,7 @@ end (Scope flaw _ branches) = do
  where
   onInterruption act after = try act >>= either (\(_ :: SomeException) -> after) pure
   wait (SomeBranch b) = atomically (fault <$> outcomeOf b)
-  waitFirmly (SomeBranch b) = firmly (atomically (fault <$> outcomeOf b))
+  waitFirmly (SomeBranch b) = awaitUninterruptibly (atomically (fault <$> outcomeOf b))
   fault = \case
     Faulted e -> [e]
     _ -> []
@@ -179,7 +179,7 @@ unasked (SomeBranch (Branch _ asked outcome)) = do
   if over then pure False else not <$> atomicModifyIORef' asked (\was -> (True, was))
 
 askByMessenger :: SomeBranch -> IO ()
-askByMessenger (SomeBranch (Branch thread _ _)) = interruptByMessengers Stop [thread]
+askByMessenger (SomeBranch (Branch thread _ _)) = throwToAll Stop [thread]
 
 outcomeOf :: Branch a -> STM (Outcome a)
 outcomeOf (Branch _ _ outcome) = outcome

@@ -181,7 +181,7 @@ timeoutWith flaw seconds act
       me <- myThreadId
       structured flaw "timeout" $ \scope -> do
         running <- branch scope "branch" act
-        _ <- branch scope "clock" (sleep seconds >> interruptByMessengers Stop [me])
+        _ <- branch scope "clock" (sleep seconds >> throwToAll Stop [me])
         (settle <$> atomically (outcomeOf running)) `catch` \e ->
           if isCancellation e then pure (throwIO (TimedOut seconds)) else throwIO e
   | otherwise = do

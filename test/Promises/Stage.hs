@@ -54,7 +54,7 @@ import Behavior.Internal.Runtime
   , Thread (threadId)
   , atomically
   , checkpoint
-  , interruptByMessengers
+  , throwToAll
   , start
   , threadEnd
   )
@@ -143,8 +143,8 @@ calling stage change deeds act = do
   for_ deeds $ \(after, deed) -> do
     pause stage after
     case deed of
-      CancelsIt -> interruptByMessengers (const (Cancel "the caller")) [threadId caller]
-      ThrowsAtIt -> interruptByMessengers (const Outside) [threadId caller]
+      CancelsIt -> throwToAll (const (Cancel "the caller")) [threadId caller]
+      ThrowsAtIt -> throwToAll (const Outside) [threadId caller]
       Changes world -> change world
   endingOf <$> atomically (threadEnd caller)
 

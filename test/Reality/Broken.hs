@@ -16,7 +16,7 @@ import Control.Monad (void, when)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Seam (simulator, taking)
+import Behavior.Internal.Seam (simulator, withBackend)
 import Behavior.Internal.Simulator
 
 -- | Runs a behaviour by the wrong rule, if it runs in a simulation.
@@ -24,7 +24,7 @@ late :: IO a -> IO a
 late act =
   simulator >>= \case
     Nothing -> act
-    Just s -> newTVarIO Set.empty >>= \shut -> taking (-1) (lately s shut) act
+    Just s -> newTVarIO Set.empty >>= \shut -> withBackend (-1) (lately s shut) act
 
 -- | The threads in the set cannot be interrupted; each says so at its operations.
 lately :: Simulator -> TVar (Set ThreadId) -> Simulator

@@ -32,7 +32,7 @@ import Data.Set (Set)
 import qualified Data.Set as Set
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 
-import Behavior.Internal.Runtime hiding (note)
+import Behavior.Internal.Runtime
 import Behavior.Internal.Seam (inSimulation)
 import Behavior.Sim
 import Support

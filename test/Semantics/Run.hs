@@ -85,7 +85,7 @@ observing :: (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Se
 observing simulated world = do
   happened <- newIORef []
   -- In the record of the run is when it happened.
-  let tell event = modifyIORef' happened (event :) >> note (show event)
+  let tell event = modifyIORef' happened (event :) >> annotate (show event)
   run <- simulated (behavior tell world)
   told <- reverse <$> readIORef happened
   let record = recorded (Sim.steps run) told
@@ -135,8 +135,8 @@ behavior tell world = do
     Stranger type' later -> do
       thread <- mask_ (start (Sim.Label "stranger" "") played)
       let interrupting = case type' of
-            Asynchronous -> interruptByMessengers (const Enough) [threadId thread]
-            Synchronous -> interruptByMessengers (const EnoughOfThis) [threadId thread]
+            Asynchronous -> throwToAll (const Enough) [threadId thread]
+            Synchronous -> throwToAll (const EnoughOfThis) [threadId thread]
       environment stage
       interrupting
       sleepUntil (fromIntegral (patience world + later))

@@ -22,7 +22,7 @@ import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Time (timeout)
-import Support hiding (note)
+import Support
 
 spec :: Spec
 spec = guarded $ do
@@ -126,8 +126,8 @@ asGHC = do
         ( \_ ready -> mask $ \restore -> do
             ready
             uninterruptibleMask_ (atomically (readTVar opened >>= STM.check) >> sleep 1)
-            note "unmasks"
-            restore (pure ()) `catch` \(_ :: Cancel) -> note "handles"
+            annotate "unmasks"
+            restore (pure ()) `catch` \(_ :: Cancel) -> annotate "handles"
         )
         (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
     [(at s, did s) | s <- steps run, label s == Label "target" "", did s `notElem` [Starts, Ends]]
@@ -156,7 +156,7 @@ realOrder names = do
   reverse <$> readIORef book
 
 send' :: ThreadId -> String -> IO ()
-send' target name = interruptByMessengers (const (Cancel name)) [target]
+send' target name = throwToAll (const (Cancel name)) [target]
 
 returned :: Run a -> Maybe a
 returned run = case outcome run of
@@ -200,7 +200,7 @@ senders = do
           sender <- mask_ . start (Label "sender" "") $ mask_ $ do
             uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
             interrupt (threadId target) (Cancel "a")
-          interruptByMessengers (const (Cancel "b")) [threadId sender]
+          throwToAll (const (Cancel "b")) [threadId sender]
           sleep 1
           atomically (writeTVar opened True)
           (,) <$> fmap shown (atomically (threadEnd sender)) <*> fmap shown (atomically (threadEnd target))
@@ -217,7 +217,7 @@ senders = do
     weak <- mkWeakIORef held (pure ())
     run <- simulate $ do
       target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (atomically STM.retry)))
-      interruptByMessengers (const (Holding held)) [threadId target]
+      throwToAll (const (Holding held)) [threadId target]
       sleep 1 :: IO ()
       atomically STM.retry :: IO ()
     explain (outcome run) `shouldSatisfy` ("interrupt: messenger waits for target, to hear an exception" `isInfixOf`)
@@ -229,7 +229,7 @@ senders = do
       target <- mask_ . start (Label "target" "") $ do
         end <- try (uninterruptibleMask_ (atomically STM.retry))
         either (\(_ :: SomeException) -> modifyIORef book ("unwound" :)) (\() -> pure ()) end
-      interruptByMessengers (const (Cancel "a")) [threadId target]
+      throwToAll (const (Cancel "a")) [threadId target]
       sleep 1
       atomically STM.retry :: IO ()
     readIORef book `shouldReturn` ["unwound"]
@@ -242,14 +242,14 @@ endOfBranch = do
     ends <- everyEnd $ do
       target <- mask_ (start (Label "target" "") (sleep 1))
       sleep 1
-      interruptByMessengers (const (Cancel "a")) [threadId target]
+      throwToAll (const (Cancel "a")) [threadId target]
       either (show :: SomeException -> String) (\() -> "returned") <$> atomically (threadEnd target)
     ends `shouldMatchList` [show "returned", show (show (Cancel "a"))]
   it "that has none can be stopped too" $ do
     did' <- newIORef (0 :: Int)
     ends <- everyEnd $ do
       target <- mask_ (start (Label "target" "") (modifyIORef did' (+ 1)))
-      interruptByMessengers (const (Cancel "a")) [threadId target]
+      throwToAll (const (Cancel "a")) [threadId target]
       earlier <- readIORef did'
       end <- atomically (threadEnd target)
       at' <- readIORef did'

@@ -10,11 +10,11 @@ import Data.List (isInfixOf, isPrefixOf, nub, sort)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime (note)
+import Behavior.Internal.Runtime (annotate)
 import Behavior.Parallel (allOf)
 import Behavior.Sim
 import Behavior.Time (atomically, checkpoint)
-import Support hiding (note)
+import Support
 
 spec :: Spec
 spec = guarded $ do
@@ -30,7 +30,7 @@ counting n simulateIt = do
   _ <- simulateIt $ do
     let count = do
           seen <- atomically (readTVar counter)
-          note ("saw " ++ show seen)
+          annotate ("saw " ++ show seen)
           atomically (writeTVar counter (seen + 1))
         counters = foldr both (pure ()) (replicate n count)
     counters
@@ -140,7 +140,7 @@ counterexample = do
     run <- simulate (both (sleep 1) (both (sleep 1) (sleep 1)))
     map number (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
   it "has the steps in which a name occurs, in a label or in what was done" $ do
-    run <- simulate (both (note "a") (note "left"))
+    run <- simulate (both (annotate "a") (annotate "left"))
     [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
   it "tells the branches of two operators apart" $ do
     run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))

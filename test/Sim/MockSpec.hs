@@ -10,7 +10,7 @@ import System.IO.Error (isUserError)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..), Thread (threadId), interruptByMessengers, start, threadEnd)
+import Behavior.Internal.Runtime (Label (..), Thread (threadId), throwToAll, start, threadEnd)
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Options (..), Outcome (..), Run (..), Schedule (..), defaults, simulate, simulateWith)
@@ -161,7 +161,7 @@ stopped = do
       act <- action mock "act" [script]
       _ <- simulate $ do
         thread <- mask_ (start (Label "test" "act") act)
-        replicateM_ 3 $ sleep 1 >> interruptByMessengers (const (Cancel "again")) [threadId thread]
+        replicateM_ 3 $ sleep 1 >> throwToAll (const (Cancel "again")) [threadId thread]
         atomically (threadEnd thread)
       map (\e -> (happenedAt e, happening e)) . entries <$> happened mock
         `shouldReturn` [(0, Begins), (1, AskedToStop), (t, end)]

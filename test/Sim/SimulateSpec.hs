@@ -18,13 +18,13 @@ import System.Mem (performMajorGC)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime (note)
+import Behavior.Internal.Runtime (annotate)
 import Behavior.Parallel (fork, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Time (atomically, checkpoint, now, timeout)
 import Sim.Busy (busy)
-import Support hiding (note)
+import Support
 
 spec :: Spec
 spec = guarded $ do
@@ -286,6 +286,6 @@ beside = do
       ended run `shouldBe` "failed Failed"
       (end - begin) `shouldSatisfy` (>= 0.002)
   it "a note of theirs is not in the record" $ do
-    note "of nobody"
-    run <- simulate (note "of mine")
+    annotate "of nobody"
+    run <- simulate (annotate "of mine")
     [text | Note text <- map did (steps run)] `shouldBe` ["of mine"]

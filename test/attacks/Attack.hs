@@ -6,7 +6,7 @@
 -- calls 'broken' when it was not.
 module Attack
   ( broken
-  , living
+  , liveThreadCount
   , promise
   , endsWithin
   , inThread
@@ -31,8 +31,8 @@ broken why = do
   throwIO (ErrorCall why)
 
 -- | How many threads the library started that have not ended.
-living :: IO Int
-living = peek threads
+liveThreadCount :: IO Int
+liveThreadCount = peek threads
 
 foreign import ccall "&behavior_lang_threads" threads :: Ptr Int
 

@@ -34,5 +34,5 @@ attack =
     case end of
       Right () -> pure ()
       Left e -> promise ("round " ++ show k ++ ": " ++ show e) (fromException e == Just (Boom k))
-    n <- living
+    n <- liveThreadCount
     promise ("round " ++ show k ++ ": " ++ show n ++ " threads were left") (n == 0)

@@ -28,7 +28,7 @@ attack = do
         forM_ children requestStop
         forM_ children (\c -> (void (atomically (await c)) ? pure ()) `finally` requestStop c)
     end `seq` pure ()
-    n <- living
+    n <- liveThreadCount
     promise ("race " ++ show k ++ ": " ++ show n ++ " threads were left") (n == 0)
   putStrLn "races held" >> hFlush stdout
   -- A child that is stopped has not failed its scope; one that completes all the same has a result.

@@ -25,7 +25,7 @@ attack =
         me <- myThreadId
         (around :: IO () -> IO ()) (operator (Signal.watching (readTVar flag)) ((putMVar entered () >> milliseconds 3600000) `finally` throwTo me (Boom 1)))
         milliseconds 500
-      n <- living
+      n <- liveThreadCount
       promise (show n ++ " threads were left") (n == 0)
 
 operators :: [(String, Signal.Signal Bool -> IO () -> IO ())]

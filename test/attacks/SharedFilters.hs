@@ -80,6 +80,6 @@ attack = do
   ended what act = inThread 30000 what act >>= either (\e -> void (broken (what ++ ": " ++ show e))) pure >> none what
   faulted what act = inThread 5000 what act >>= either (\e -> promise (what ++ ": " ++ show e) (isJust (fromException e :: Maybe Boom))) (const (void (broken what))) >> none what
   failing what act = inThread 5000 what act >>= either (\e -> promise (what ++ ": " ++ show e) (isJust (fromException e :: Maybe BehaviorFailed))) (const (void (broken what))) >> none what
-  none what = living >>= \n -> promise (what ++ ": " ++ show n ++ " threads were left") (n == 0)
+  none what = liveThreadCount >>= \n -> promise (what ++ ": " ++ show n ++ " threads were left") (n == 0)
   resident False = pure 0
   resident True = performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats

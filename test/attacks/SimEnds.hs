@@ -23,14 +23,14 @@ attack = do
   before <- resident enabled
   forM_ [1 .. 20000] same
   after <- resident enabled
-  n <- living
+  n <- liveThreadCount
   promise (show n ++ " threads were left") (n == 0)
   promise ("memory " ++ show (before, after)) (after < before + 1000000)
   putStrLn ("the same seed, the same run; memory " ++ show (before, after))
   forM_ [1 .. 1500 :: Int] $ \k -> do
     _ <- inThread 10000 "an interrupted simulation" $
       timeout (k `mod` 400) (void (simulateWith defaults {scheduled = Seeded k} (void program >> void program)))
-    left <- living
+    left <- liveThreadCount
     promise (show left ++ " threads were left") (left == 0)
  where
   same seed = do

@@ -65,7 +65,7 @@ attack = do
     putStrLn (what ++ ": " ++ show share ++ " of a processor while all wait")
     putMVar gate ()
     _ <- inThread 20000 what finish
-    n <- living
+    n <- liveThreadCount
     promise (what ++ ": " ++ show n ++ " threads were left") (n == 0)
     pure [what ++ ": they used " ++ show share ++ " of a processor while they waited" | share >= 0.1]
   resident = performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats

@@ -45,7 +45,7 @@ attack =
       waiting (5000 :: Int) what over
       n <- readIORef stops
       unless (n == 1) (void (broken (what ++ ": stopped " ++ show n ++ " times")))
-      left <- living
+      left <- liveThreadCount
       promise (what ++ ": " ++ show left ++ " threads were left") (left == 0)
  where
   count r = atomicModifyIORef' r (\n -> (n + 1, ()))

@@ -69,7 +69,7 @@ attack = do
           when (f > 0 && not (faultIn k r)) (void (broken ("storm " ++ show k ++ ": a fault was lost: " ++ show r)))
         writeIORef heard 1
     end `seq` pure ()
-    left <- living
+    left <- liveThreadCount
     promise ("storm " ++ show k ++ ": " ++ show left ++ " threads were left") (left == 0)
     replicateM_ 1 (threadDelay 100)
  where

@@ -19,7 +19,7 @@ module Behavior.Internal.Alarm
   ( sleepBetween
   , sleepToSlot
   , slotTime
-  , nextGate
+  , nextBucket
   ) where
 
 import Control.Concurrent (forkIO, myThreadId, rtsSupportsBoundThreads, threadDelay, yield)
@@ -38,9 +38,9 @@ import System.IO.Unsafe (unsafePerformIO)
 
 -- | All that sleeps in this process.
 data Alarms = Alarms
-  { gates :: !(IntMap (MVar ()))
+  { buckets :: !(IntMap (MVar ()))
   -- ^ One for each tick in which somebody wants to wake. It is opened once.
-  , clocks :: ![Tick]
+  , armedTimers :: ![Tick]
   -- ^ When the clocks go off, the earliest first. One that is set is never stopped: when
   -- somebody wants to wake earlier, another is set.
   }
@@ -68,24 +68,24 @@ sleepToSlot period from to = slot <$ sleepBetween from slot
 -- what is rounded does not add up.)
 slotTime :: Double -> Double -> Double -> Double
 slotTime period from to
-  | to > from && to < forever from && tenth > hair = tenth * fromIntegral (ceiling ((to - hair) / tenth) :: Int)
+  | to > from && to < forever from && tenth > epsilon = tenth * fromIntegral (ceiling ((to - epsilon) / tenth) :: Int)
   | otherwise = to
  where
   tenth = period / 10
-  hair = 1e-6
+  epsilon = 1e-6
 
 sleepTicks :: Tick -> Tick -> IO ()
 sleepTicks from end = go from
  where
   go t = do
-    let next = nextGate from end t
-    gateAt next >>= readMVar
+    let next = nextBucket from end t
+    bucketAt next >>= readMVar
     when (next < end) $ go next
 
 -- | Where to wait next, having slept until the third, when it is to be from the first until
 -- the second.
-nextGate :: Tick -> Tick -> Tick -> Tick
-nextGate from end t = t + min (end - t) (max aSecond (t - from))
+nextBucket :: Tick -> Tick -> Tick -> Tick
+nextBucket from end t = t + min (end - t) (max ticksPerSecond (t - from))
 
 -- | A century from now is as good as for ever, and can be counted.
 forever :: Double -> Double
@@ -95,31 +95,31 @@ forever from = from + 3e9
 type Tick = Int
 
 tick :: (Double -> Tick) -> Double -> Tick
-tick rounded seconds = rounded (seconds * fromIntegral aSecond)
+tick rounded seconds = rounded (seconds * fromIntegral ticksPerSecond)
 
-aSecond :: Tick
-aSecond = 8000
+ticksPerSecond :: Tick
+ticksPerSecond = 8000
 
 -- | The gate that opens at the tick.
-gateAt :: Tick -> IO (MVar ())
-gateAt t = readIORef alarms >>= maybe (newGate t) pure . IntMap.lookup t . gates
+bucketAt :: Tick -> IO (MVar ())
+bucketAt t = readIORef alarms >>= maybe (newBucket t) pure . IntMap.lookup t . buckets
 
-newGate :: Tick -> IO (MVar ())
-newGate t = mask_ $ do
+newBucket :: Tick -> IO (MVar ())
+newBucket t = mask_ $ do
   new <- newEmptyMVar
-  (gate, unclocked) <- atomicModifyIORef' alarms $ \known ->
-    case IntMap.lookup t (gates known) of
+  (bucket, unclocked) <- atomicModifyIORef' alarms $ \known ->
+    case IntMap.lookup t (buckets known) of
       Just old -> (known, (old, False))
       Nothing
-        | t `isBeforeAll` clocks known -> (Alarms others (t : clocks known), (new, True))
-        | otherwise -> (known {gates = others}, (new, False))
+        | t `isBeforeAll` armedTimers known -> (Alarms others (t : armedTimers known), (new, True))
+        | otherwise -> (known {buckets = others}, (new, False))
        where
-        others = IntMap.insert t new (gates known)
+        others = IntMap.insert t new (buckets known)
   when unclocked . void . forkIO $ do
     self <- myThreadId
     labelThread self "clock"
     clock t t
-  pure gate
+  pure bucket
 
 isBeforeAll :: Tick -> [Tick] -> Bool
 isBeforeAll t = all (t <) . take 1
@@ -130,26 +130,26 @@ clock :: Tick -> Tick -> IO ()
 clock t later = do
   getMonotonicTime >>= delay
   current <- tick floor <$> getMonotonicTime
-  (due, next) <- atomicModifyIORef' alarms (goOff current)
+  (due, next) <- atomicModifyIORef' alarms (expire current)
   traverse_ (`putMVar` ()) due
   -- First those who were woken: if they have gone to sleep again when this thread does,
   -- the system has no thread to wake for them.
   yield
   -- (Not by 'Data.Foldable.for_', which would come back: the clock's stack would grow.)
-  maybe (pure ()) (\t' -> clock t' (max t' (current + pause))) next
+  maybe (pure ()) (\t' -> clock t' (max t' (current + minTimerGap))) next
  where
   delay now = when (left > 0) $ sleepFor left >> getMonotonicTime >>= delay
    where
-    left = fromIntegral later / fromIntegral aSecond - now
-  goOff current known = (Alarms future (maybe others (: others) next), (IntMap.elems past ++ toList now, next))
+    left = fromIntegral later / fromIntegral ticksPerSecond - now
+  expire current known = (Alarms future (maybe others (: others) next), (IntMap.elems past ++ toList now, next))
    where
-    (past, now, future) = IntMap.splitLookup current (gates known)
-    others = delete t (clocks known)
+    (past, now, future) = IntMap.splitLookup current (buckets known)
+    others = delete t (armedTimers known)
     next = IntMap.lookupMin future >>= \(at, _) -> if at `isBeforeAll` others then Just at else Nothing
 
 -- | How long a clock rests at least, for all who want to wake meanwhile.
-pause :: Tick
-pause = 6
+minTimerGap :: Tick
+minTimerGap = 6
 
 -- | Sleeps for about so many seconds; the last stretch by the system's sleep, which is more
 -- exact than GHC's, and not so dear to set. (It keeps a thread of the system busy, and

@@ -28,7 +28,7 @@ import Data.Foldable (asum, traverse_)
 import Behavior.Internal.Failure
 import Behavior.Internal.Parallel (tell, told)
 import Behavior.Internal.Runtime (Label (..), atomically)
-import Behavior.Internal.Scope
+import Behavior.Internal.Scope hiding (requestStop)
 
 -- $setup
 -- >>> import Behavior
@@ -106,7 +106,7 @@ serving stage scope body = do
   let -- How many were forked; those that may live yet; and the number at which to look for
       -- those that do not.
       serve count children sweepAt = do
-        next <- atomically (asum [Left . settle <$> outcome main, Left . throwIO <$> told trouble, Right <$> requested])
+        next <- atomically (asum [Left . outcomeToIO <$> outcome main, Left . throwIO <$> told trouble, Right <$> requested])
         case next of
           Left verdict -> pure verdict
           Right new -> do
@@ -117,12 +117,12 @@ serving stage scope body = do
                 living <- filterM mayLive children'
                 serve count' living (count' + max 16 (length living))
       doing (count, children) = \case
-        Stop child -> (count, children) <$ ask [child]
+        Stop child -> (count, children) <$ requestStopAsync [child]
         Fork act accepted -> do
           let n = count + 1 :: Int
           -- Masked: what was started is also handed over.
           child <- mask_ $ do
-            new <- branchThen (traverse_ (tell trouble n) . troubleOf) scope (Label "scoped" "fork") act
+            new <- branchWithHook (traverse_ (tell trouble n) . troubleOf) scope (Label "scoped" "fork") act
             new <$ atomically (putTMVar accepted new)
           pure (n, SomeBranch child : children)
       requested =
@@ -131,7 +131,7 @@ serving stage scope body = do
           _ -> retry
       -- Of those that have ended without trouble nothing is kept.
       mayLive (SomeBranch child) =
-        outcomeNow child >>= \end -> case troubleOf <$> end of
+        tryReadOutcome child >>= \end -> case troubleOf <$> end of
           Just Nothing -> False <$ forget scope child
           _ -> pure True
   serve 0 [] 16
@@ -193,7 +193,7 @@ await = tryAwait >=> maybe retry (either throwSTM pure)
 --
 -- @since 0.1.0.0
 tryAwait :: Child a -> STM (Maybe (Either SomeException a))
-tryAwait (Child _ child) = fmap ending <$> outcomeSoFar child
+tryAwait (Child _ child) = fmap ending <$> tryReadOutcomeSTM child
  where
   ending = \case
     Stopped _ -> Left (toException ChildStopped)

@@ -28,7 +28,7 @@ import Data.Foldable (toList)
 import Data.Traversable (mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, failed)
-import Behavior.Internal.Runtime (Label (..), atomically, unlessAtAGlance)
+import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 
 -- $setup
@@ -60,7 +60,7 @@ parallel left right = structured $ \scope -> do
   r <- branch scope (Label "parallel" "right") (void right)
   -- At a glance only the left one: of the other it could not be said that the left one had
   -- not ended before.
-  settle <$> unlessAtAGlance (outcomeNow l) (atomically (outcomeSoFar l >>= maybe (outcome r) pure))
+  outcomeToIO <$> tryReadThenBlock (tryReadOutcome l) (atomically (tryReadOutcomeSTM l >>= maybe (outcome r) pure))
 
 -- | 'parallel' as an operator. It binds looser than @?@ and tighter than
 -- 'Prelude.>>'. (@Control.Arrow@ has another function of this name.)
@@ -96,9 +96,9 @@ both left right = structured $ \scope -> do
   l <- branch scope (Label "both" "left") (void left)
   r <- branch scope (Label "both" "right") (void right)
   let -- The left one first: when that has ended, it has also when the other is looked at.
-      atAGlance = outcomeNow l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$!> outcomeNow r)
-      atOnce = verdict <$> outcomeSoFar l <*> outcomeSoFar r
-  unlessAtAGlance atAGlance (atomically (atOnce >>= maybe retry pure))
+      atAGlance = tryReadOutcome l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$!> tryReadOutcome r)
+      atOnce = verdict <$> tryReadOutcomeSTM l <*> tryReadOutcomeSTM r
+  tryReadThenBlock atAGlance (atomically (atOnce >>= maybe retry pure))
  where
   verdict l r = case (result <$> l, result <$> r) of
     (Just (Left e), _) -> Just (throwIO e)
@@ -125,8 +125,8 @@ firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
 firstOf behaviors = structured $ \scope -> do
   first <- newTVarIO Nothing
-  void $ startAll (\n -> branchThen (tell first n) scope (Label "firstOf" (show n))) behaviors
-  settle <$> unlessAtAGlance (toldNow first) (atomically (told first))
+  void $ startAll (\n -> branchWithHook (tell first n) scope (Label "firstOf" (show n))) behaviors
+  outcomeToIO <$> tryReadThenBlock (toldNow first) (atomically (told first))
 
 -- | Starts all at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
@@ -143,12 +143,12 @@ firstOf behaviors = structured $ \scope -> do
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
 allOf behaviors = structured $ \scope -> do
   trouble <- newTVarIO Nothing
-  branches <- startAll (\n -> branchThen (tellTrouble trouble n) scope (Label "allOf" (show n))) (toList behaviors)
-  let waiting [] = pure (refilled behaviors <$> traverse (settle <=< ended) branches)
+  branches <- startAll (\n -> branchWithHook (tellTrouble trouble n) scope (Label "allOf" (show n))) (toList behaviors)
+  let waiting [] = pure (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches)
       waiting (b : bs) = do
         wrong <-
-          unlessAtAGlance ((Nothing <$) <$> completedNow b) . atomically $
-            outcomeSoFar b >>= \case
+          tryReadThenBlock ((Nothing <$) <$> completedNow b) . atomically $
+            tryReadOutcomeSTM b >>= \case
               Just (Completed _) -> pure Nothing
               _ -> Just <$> told trouble
         maybe (waiting bs) (pure . throwIO) wrong

@@ -52,4 +52,4 @@ runBehavior :: Behavior a -> IO a
 runBehavior behavior = withSignals $ \exitCode ->
   structured $ \scope -> do
     program <- branch scope (Label "runBehavior" "program") behavior
-    atomically $ (settle <$> outcome program) `orElse` (throwIO . ExitFailure <$> exitCode)
+    atomically $ (outcomeToIO <$> outcome program) `orElse` (throwIO . ExitFailure <$> exitCode)

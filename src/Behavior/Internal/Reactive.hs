@@ -29,7 +29,7 @@ import Data.List (findIndex)
 import Data.Maybe (catMaybes)
 
 import Behavior.Internal.Failure (Behavior, failWith)
-import Behavior.Internal.Runtime (Label (..), atomically, unlessAtAGlance)
+import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Source
 
@@ -101,11 +101,11 @@ changed engine sensors value =
 -- | Does what the wakeup says; no branch runs.
 follow :: Eq k => Engine k a -> Sensors -> View k -> Wakeup k a -> IO (IO a)
 follow engine sensors seen = \case
-  BranchEnded end -> pure (settle end)
+  BranchEnded end -> pure (outcomeToIO end)
   SensorDied e -> pure (throwIO e)
   Changed _ (Conclude verdict) -> pure verdict
   Changed _ (RunToEnd name recovery) -> do
-    ask (map SomeBranch sensors)
+    requestStopAsync (map SomeBranch sensors)
     recover engine sensors name recovery Nothing
   Changed old Idle -> atomically (changedFrom old) >>= follow engine sensors seen
   Changed old (Run name act) -> do
@@ -113,10 +113,10 @@ follow engine sensors seen = \case
     -- The branch is looked at first: one that has ended by itself is not
     -- interrupted, whatever the signal says in the same transaction.
     wakeup <-
-      unlessAtAGlance (fmap BranchEnded <$> outcomeNow running) . atomically $
-        outcomeSoFar running >>= maybe (changedFrom old) (pure . BranchEnded)
+      tryReadThenBlock (fmap BranchEnded <$> tryReadOutcome running) . atomically $
+        tryReadOutcomeSTM running >>= maybe (changedFrom old) (pure . BranchEnded)
     case wakeup of
-      BranchEnded end -> pure (settle end)
+      BranchEnded end -> pure (outcomeToIO end)
       SensorDied e -> interrupt engine sensors running (Finish (throwIO e))
       Changed _ new -> interrupt engine sensors running $ case new of
         Conclude verdict -> Finish verdict
@@ -131,13 +131,13 @@ interrupt engine sensors running = \case
   Finish verdict ->
     stop sensors' >>= \case
       Stopped _ -> pure verdict
-      end -> pure (settle end)
+      end -> pure (outcomeToIO end)
   Recover name recovery ->
     stop sensors' >>= \case
       Completed a -> pure (pure a)
       Stopped _ -> forget (scope engine) running >> recover engine sensors name recovery Nothing
       -- A cleanup that went wrong must not keep the robot from its charger.
-      wrong -> recover engine sensors name recovery (Just (settle wrong))
+      wrong -> recover engine sensors name recovery (Just (outcomeToIO wrong))
   Reselect ->
     stop [] >>= \case
       -- Read again: by now the value may be another, or the old one again.
@@ -145,18 +145,18 @@ interrupt engine sensors running = \case
         forget (scope engine) running
         seen <- atomically (view (source engine))
         select engine sensors seen Reread
-      end -> pure (settle end)
+      end -> pure (outcomeToIO end)
  where
   sensors' = map SomeBranch sensors
   -- It waits for the branch, but not for the others.
-  stop others = ask others >> askToAwait [SomeBranch running] >> ended running
+  stop others = requestStopAsync others >> requestStop [SomeBranch running] >> awaitOutcome running
 
 -- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
 -- those that are slow to, but what comes after it does.
 recover :: Eq k => Engine k a -> Sensors -> String -> Behavior () -> Maybe (IO a) -> IO (IO a)
 recover engine sensors name recovery aftermath = do
   recovered <- branch (scope engine) (Label (operator engine) name) recovery
-  end <- ended recovered
+  end <- awaitOutcome recovered
   case (result end, aftermath) of
     (_, Just verdict) -> pure verdict
     (Left wrong, Nothing) -> pure (throwIO wrong)
@@ -171,7 +171,7 @@ recover engine sensors name recovery aftermath = do
 -- in the scope, which throws its fault.
 awaitStopped :: Scope -> Branch () -> IO (Maybe SomeException)
 awaitStopped within sensor =
-  ended sensor >>= \case
+  awaitOutcome sensor >>= \case
     Faulted fault -> pure (Just fault)
     _ -> Nothing <$ forget within sensor
 

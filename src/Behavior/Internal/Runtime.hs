@@ -18,21 +18,21 @@ module Behavior.Internal.Runtime
     Label (..)
   , Thread (threadId)
   , threadEnd
-  , threadEndSoFar
-  , threadEndNow
+  , tryReadEndSTM
+  , tryReadEnd
   , start
   , startWith
   , interrupt
-  , interruptDirectly
-  , interruptByMessengers
-  , living
+  , throwToOne
+  , throwToAll
+  , liveThreadCount
 
     -- * Waiting
   , atomically
-  , firmly
-  , unlessAtAGlance
+  , awaitUninterruptibly
+  , tryReadThenBlock
   , checkpoint
-  , giveWay
+  , yieldReal
 
     -- * Time
   , Seconds (..)
@@ -44,10 +44,10 @@ module Behavior.Internal.Runtime
 
     -- * Watching
   , Event (..)
-  , note
+  , annotate
   , isRecorded
   , runClock
-  , reportingTo
+  , withSink
   ) where
 
 import Control.Concurrent (ThreadId, forkIO, forkIOWithUnmask, myThreadId, throwTo, yield)
@@ -89,15 +89,15 @@ data Thread r = Thread
 
 -- | What the thread published; retries until it has ended.
 threadEnd :: Thread r -> STM r
-threadEnd thread = threadEndSoFar thread >>= maybe STM.retry pure
+threadEnd thread = tryReadEndSTM thread >>= maybe STM.retry pure
 
 -- | What the thread has published, if it has ended.
-threadEndSoFar :: Thread r -> STM (Maybe r)
-threadEndSoFar = STM.readTVar . threadResult
+tryReadEndSTM :: Thread r -> STM (Maybe r)
+tryReadEndSTM = STM.readTVar . threadResult
 
 -- | The same, at a glance.
-threadEndNow :: Thread r -> IO (Maybe r)
-threadEndNow = STM.readTVarIO . threadResult
+tryReadEnd :: Thread r -> IO (Maybe r)
+tryReadEnd = STM.readTVarIO . threadResult
 
 -- | Starts a thread in which the action runs unmasked, whatever the caller's
 -- masking state, and which publishes how that ended. Call it masked, or the thread may be
@@ -121,7 +121,7 @@ startReally finish hook label act = do
   -- Forked masked: an exception cannot strike before 'try' is in place, nor
   -- between the end of the action and the publication of how it ended.
   thread <- forkIOWithUnmask $ \unmask -> do
-    end <- life tell label (unmask act) >>= finish
+    end <- runThread emit label (unmask act) >>= finish
     STM.atomically (STM.writeTVar result (Just end) >> hook end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
@@ -129,8 +129,8 @@ startReally finish hook label act = do
 startSimulated :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread r)
 startSimulated finish hook label act simulation = do
   result <- STM.newTVarIO Nothing
-  let report event = tell event >> record simulation event
-  thread <- spawn simulation label (\begin unmask -> life report label (unmask (begin >> toItsEnd)) >>= finish) $ \end ->
+  let report event = emit event >> record simulation event
+  thread <- spawn simulation label (\begin unmask -> runThread report label (unmask (begin >> toItsEnd)) >>= finish) $ \end ->
     STM.writeTVar result (Just end) >> hook end
   add threads 1
   pure (Thread thread result)
@@ -140,20 +140,20 @@ startSimulated finish hook label act simulation = do
 {-# NOINLINE startSimulated #-}
 
 -- | What a thread does (it reports as it is told), and how the action ended.
-life :: (Event -> IO ()) -> Label -> IO a -> IO (Either SomeException a)
-life report label act = do
-  when labelling (bear label)
+runThread :: (Event -> IO ()) -> Label -> IO a -> IO (Either SomeException a)
+runThread report label act = do
+  when labelling (labelSelf label)
   report (Started label)
   end <- try act
   report (Ended label)
   add threads (-1)
   pure end
-{-# INLINE life #-}
+{-# INLINE runThread #-}
 
 -- | The calling thread has this label from now on.
-bear :: Label -> IO ()
-bear label = myThreadId >>= \self -> labelThread self (show label)
-{-# NOINLINE bear #-}
+labelSelf :: Label -> IO ()
+labelSelf label = myThreadId >>= \self -> labelThread self (show label)
+{-# NOINLINE labelSelf #-}
 
 -- | Whether labels can be seen by anybody. Before GHC 9.6 only an event log shows them,
 -- and to label a thread costs more than to start it.
@@ -178,9 +178,9 @@ interrupt thread e =
 
 -- | 'interrupt' for a caller that then waits for the end of the thread. It is not withdrawn: if
 -- the caller is interrupted before the thread has heard, a messenger goes on. Call it masked.
-interruptDirectly :: Exception e => ThreadId -> e -> IO ()
-interruptDirectly thread e =
-  inSimulation (throwTo thread e `onException` interruptByMessengers (const e) [thread]) $ \simulation ->
+throwToOne :: Exception e => ThreadId -> e -> IO ()
+throwToOne thread e =
+  inSimulation (throwTo thread e `onException` throwToAll (const e) [thread]) $ \simulation ->
     send simulation thread (toException e)
 
 -- | 'interrupt' by messengers, who do the waiting: none of the threads hears it later
@@ -188,28 +188,28 @@ interruptDirectly thread e =
 --
 -- One messenger does all the errands, until it has to wait. Then there is another for those
 -- that are left: at most as many as there are threads to interrupt.
-interruptByMessengers :: Exception e => (ThreadId -> e) -> [ThreadId] -> IO ()
-interruptByMessengers what errands =
-  inSimulation byMessenger $ \simulation -> for_ errands $ \thread -> send simulation thread (toException (what thread))
+throwToAll :: Exception e => (ThreadId -> e) -> [ThreadId] -> IO ()
+throwToAll what targets =
+  inSimulation byMessenger $ \simulation -> for_ targets $ \thread -> send simulation thread (toException (what thread))
  where
-  byMessenger = newIORef errands >>= hire errands
-  hire [] _ = pure ()
-  hire (_ : others) left =
+  byMessenger = newIORef targets >>= spawnHelper targets
+  spawnHelper [] _ = pure ()
+  spawnHelper (_ : others) left =
     readIORef left >>= \case
       [] -> pure ()
       _ -> do
-        messenger <- forkIO (uninterruptibleMask_ (carry left))
+        messenger <- forkIO (uninterruptibleMask_ (drain left))
         when labelling $ labelThread messenger (show (Label "interrupt" "messenger"))
         yield
-        hire others left
-  carry left =
+        spawnHelper others left
+  drain left =
     atomicModifyIORef'_ left (drop 1) >>= \case
       ([], _) -> pure ()
-      (thread : _, _) -> throwTo thread (what thread) >> carry left
+      (thread : _, _) -> throwTo thread (what thread) >> drain left
 
 -- | How many threads started by 'start' have not ended.
-living :: IO Int
-living = total threads
+liveThreadCount :: IO Int
+liveThreadCount = total threads
 
 -- | Runs a transaction, waiting (without using the processor) while it retries.
 --
@@ -233,15 +233,15 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
 --
 -- What the glance gives must be what the wait would have given, at some moment meanwhile:
 -- it should look at one variable only. (In a simulation there is no glance.)
-unlessAtAGlance :: IO (Maybe a) -> IO a -> IO a
-unlessAtAGlance glance waiting = inSimulation twice (const (pure Nothing)) >>= maybe waiting pure
+tryReadThenBlock :: IO (Maybe a) -> IO a -> IO a
+tryReadThenBlock glance waiting = inSimulation twice (const (pure Nothing)) >>= maybe waiting pure
  where
   twice = glance >>= maybe (yield >> glance) (pure . Just)
 
 -- | A wait that nothing can interrupt. It goes on when GHC takes the thread for deadlocked: GHC
 -- does so, too, while the cleanup that the thread waits for handles the same exception.
-firmly :: IO a -> IO a
-firmly waiting = uninterruptibleMask_ again
+awaitUninterruptibly :: IO a -> IO a
+awaitUninterruptibly waiting = uninterruptibleMask_ again
  where
   again = try waiting >>= either (\BlockedIndefinitelyOnSTM -> again) pure
 
@@ -260,8 +260,8 @@ checkpoint = inSimulation (pure ()) pause
 
 -- | Lets those run who were just started, or just asked for something: what they do at
 -- once need not be waited for. (In a simulation the schedule says who runs.)
-giveWay :: IO ()
-giveWay = inSimulation yield (const (pure ()))
+yieldReal :: IO ()
+yieldReal = inSimulation yield (const (pure ()))
 
 -- | The time, in seconds since some fixed moment of this run of the program. It
 -- never goes backwards, and is not the time of day.
@@ -311,15 +311,15 @@ sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time)
 
 -- | Reports every event to the given sink while the action runs. The sink is
 -- called by the thread that the event is about, masked; it must not block.
-reportingTo :: (Event -> IO ()) -> IO a -> IO a
-reportingTo sink =
+withSink :: (Event -> IO ()) -> IO a -> IO a
+withSink sink =
   bracket_
     (writeIORef eventSink (Just sink) >> add sinks 1)
     (add sinks (-1) >> writeIORef eventSink Nothing)
 
 -- | Says something that whoever watches should know.
-note :: String -> IO ()
-note text = tell (Noted text) >> inSimulation (pure ()) (\simulation -> record simulation (Noted text))
+annotate :: String -> IO ()
+annotate text = emit (Noted text) >> inSimulation (pure ()) (\simulation -> record simulation (Noted text))
 
 -- | Whether what happens now belongs to what a run is judged by. When a simulated run has
 -- ended, what is left of it is unwound, which does not.
@@ -331,11 +331,11 @@ runClock :: IO (Maybe (IO Seconds))
 runClock = inSimulation (pure Nothing) (pure . Just . lookAtClock)
 
 -- | Reports an event to the sink, if there is one.
-tell :: Event -> IO ()
-tell event = do
+emit :: Event -> IO ()
+emit event = do
   n <- total sinks
   when (n > 0) (readIORef eventSink >>= \sink -> for_ sink ($ event))
-{-# INLINE tell #-}
+{-# INLINE emit #-}
 
 eventSink :: IORef (Maybe (Event -> IO ()))
 eventSink = unsafePerformIO (newIORef Nothing)

@@ -26,21 +26,21 @@ module Behavior.Internal.Scope
     -- * Branches
   , Branch
   , outcome
-  , outcomeSoFar
-  , outcomeNow
-  , ended
+  , tryReadOutcomeSTM
+  , tryReadOutcome
+  , awaitOutcome
   , SomeBranch (..)
   , branch
-  , branchThen
+  , branchWithHook
   , worker
   , forget
-  , ask
-  , askToAwait
+  , requestStopAsync
+  , requestStop
 
     -- * How a branch ends
   , Outcome (..)
   , completedNow
-  , settle
+  , outcomeToIO
   , result
   , StoppedWithFault (..)
   ) where
@@ -89,8 +89,8 @@ outcome = threadEnd . branchThread
 
 -- | How the branch ended, if it has. (To ask several branches so, one after the other, is
 -- the same as 'orElse' between their outcomes, without its nested transactions.)
-outcomeSoFar :: Branch a -> STM (Maybe (Outcome a))
-outcomeSoFar = threadEndSoFar . branchThread
+tryReadOutcomeSTM :: Branch a -> STM (Maybe (Outcome a))
+tryReadOutcomeSTM = tryReadEndSTM . branchThread
 
 branchId :: Branch a -> ThreadId
 branchId = threadId . branchThread
@@ -151,11 +151,11 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 end :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
 end (Scope branches) state before = do
   newestFirst <- readIORef branches
-  (thrown, ()) <- patiently before (askToAwait newestFirst)
+  (thrown, ()) <- patiently before (requestStop newestFirst)
   fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
  where
   withFault (thrown, faults) (SomeBranch b) = do
-    (thrown', o) <- unlessAtAGlance (fmap ((,) thrown) <$> outcomeNow b) (patiently thrown (atomically (outcome b)))
+    (thrown', o) <- tryReadThenBlock (fmap ((,) thrown) <$> tryReadOutcome b) (patiently thrown (atomically (outcome b)))
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)
@@ -167,16 +167,16 @@ end (Scope branches) state before = do
         Right a -> pure (Nothing, a)
         Left e -> do
           deadlocked <- isDeadlock e
-          (,) (if deadlocked then Nothing else Just e) <$> firmly waiting
-    _ -> (,) thrown <$> firmly waiting
+          (,) (if deadlocked then Nothing else Just e) <$> awaitUninterruptibly waiting
+    _ -> (,) thrown <$> awaitUninterruptibly waiting
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
-branch = branchThen (\_ -> pure ())
+branch = branchWithHook (\_ -> pure ())
 
 -- | The same; in the transaction that publishes how the branch ended, the given is done too.
-branchThen :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
-branchThen hook scope label act = launch scope (\_ -> startWith classified hook label act)
+branchWithHook :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
+branchWithHook hook scope label act = launch scope (\_ -> startWith classified hook label act)
 
 -- | Starts a branch that can see whether it was asked to stop. One that runs a
 -- user's action in a loop must look: the action may have swallowed the request.
@@ -205,49 +205,49 @@ forget (Scope branches) old = modifyIORef' branches without
 -- | Asks branches to stop, all at once, by threads of its own: none receives it later because
 -- another cannot be interrupted just now. It does not wait until they have; so nothing that
 -- interrupts the caller withdraws what it has asked for.
-ask :: [SomeBranch] -> IO ()
-ask branches = mask_ $ unasked branches >>= interruptByMessengers Stop
+requestStopAsync :: [SomeBranch] -> IO ()
+requestStopAsync branches = mask_ $ claimStopRequests branches >>= throwToAll Stop
 
 -- | The same for a caller that then waits for the end of them all, and can wait here, too: it
 -- asks a single branch itself, which costs less.
-askToAwait :: [SomeBranch] -> IO ()
-askToAwait branches = mask_ $
-  unasked branches >>= \case
-    [thread] -> interruptDirectly thread (Stop thread)
-    threads -> interruptByMessengers Stop threads
+requestStop :: [SomeBranch] -> IO ()
+requestStop branches = mask_ $
+  claimStopRequests branches >>= \case
+    [thread] -> throwToOne thread (Stop thread)
+    threads -> throwToAll Stop threads
 
 -- | Those that are still to be asked, which from now on count as asked.
-unasked :: [SomeBranch] -> IO [ThreadId]
-unasked = foldM asked []
+claimStopRequests :: [SomeBranch] -> IO [ThreadId]
+claimStopRequests = foldM asked []
  where
   asked threads (SomeBranch b) = do
-    needed <- marked b
+    needed <- claimStopRequest b
     pure $! if needed then branchId b : threads else threads
 
 -- | Marks a branch as asked. False if it was asked before, or has ended.
-marked :: Branch a -> IO Bool
-marked b = do
-  over <- isJust <$> threadEndNow (branchThread b)
+claimStopRequest :: Branch a -> IO Bool
+claimStopRequest b = do
+  over <- isJust <$> tryReadEnd (branchThread b)
   asked <- readIORef (branchAsked b)
   let needed = not (over || asked)
   when needed $ writeIORef (branchAsked b) True
   pure needed
 
 -- | Waits for the end of the branch.
-ended :: Branch a -> IO (Outcome a)
-ended b = unlessAtAGlance (outcomeNow b) (atomically (outcome b))
+awaitOutcome :: Branch a -> IO (Outcome a)
+awaitOutcome b = tryReadThenBlock (tryReadOutcome b) (atomically (outcome b))
 
 -- | How the branch has ended, if it has, at a glance.
-outcomeNow :: Branch a -> IO (Maybe (Outcome a))
-outcomeNow = threadEndNow . branchThread
+tryReadOutcome :: Branch a -> IO (Maybe (Outcome a))
+tryReadOutcome = tryReadEnd . branchThread
 
 -- | What the branch has returned, if it has.
 completedNow :: Branch a -> IO (Maybe a)
-completedNow b = (>>= either (const Nothing) Just . result) <$> outcomeNow b
+completedNow b = (>>= either (const Nothing) Just . result) <$> tryReadOutcome b
 
 -- | The action that an outcome stands for.
-settle :: Outcome a -> IO a
-settle = either throwIO pure . result
+outcomeToIO :: Outcome a -> IO a
+outcomeToIO = either throwIO pure . result
 
 -- | What a branch returned, or what it threw.
 result :: Outcome a -> Either SomeException a

@@ -12,7 +12,7 @@
 module Behavior.Internal.Seam
   ( inSimulation
   , simulator
-  , taking
+  , withBackend
   ) where
 
 import Control.Concurrent (myThreadId)
@@ -41,24 +41,24 @@ inSimulation really simulated = simulator >>= maybe really simulated
 simulator :: IO (Maybe Simulator)
 simulator = do
   running <- total simulations
-  if running == 0 then pure Nothing else own
+  if running == 0 then pure Nothing else currentBackend
 {-# INLINE simulator #-}
 
 -- | The simulation in which the calling thread has the turn. (Not inlined: what is done while
 -- no simulation runs is to be short, and to allocate nothing.)
-own :: IO (Maybe Simulator)
-own = readIORef simulators >>= whose . map snd
+currentBackend :: IO (Maybe Simulator)
+currentBackend = readIORef simulators >>= whose . map snd
  where
   whose [] = pure Nothing
   whose (s : others) = do
-    mine <- hasTurn s =<< myThreadId
+    mine <- isRunning s =<< myThreadId
     if mine then pure (Just s) else whose others
-{-# NOINLINE own #-}
+{-# NOINLINE currentBackend #-}
 
 -- | Lets a simulation (each has a number of its own) take over its threads'
 -- operations while the action runs.
-taking :: Int -> Simulator -> IO a -> IO a
-taking number s =
+withBackend :: Int -> Simulator -> IO a -> IO a
+withBackend number s =
   bracket_
     (change ((number, s) :) >> add simulations 1)
     (add simulations (-1) >> change (filter ((/= number) . fst)))

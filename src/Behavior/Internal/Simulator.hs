@@ -38,7 +38,7 @@ data Event
 
 -- | How a simulation does what its threads ask of the seam.
 data Simulator = Simulator
-  { hasTurn :: ThreadId -> IO Bool
+  { isRunning :: ThreadId -> IO Bool
   -- ^ Whether this is the one thread of the simulation that runs just now.
   , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO ThreadId
   -- ^ Starts a thread, masked, and publishes what it gives as it ends. The thread is given

@@ -216,7 +216,7 @@ withShared signal body = do
     main <- branch scope (Label "withShared" "body") (body shared)
     (_, running) <- startSensors scope "withShared" source
     atomically (putTMVar sensors running)
-    settle <$> atomically (outcome main)
+    outcomeToIO <$> atomically (outcome main)
   closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"
 
 -- | The threads that run for a source, from left to right.
@@ -231,14 +231,14 @@ startSensors scope operator source = case workers source of
   needed -> do
     (runs, seen) <- atomically ((,) <$> traverse prepared needed <*> view source)
     running <- for (zip needed runs) $ \(w, run) -> worker scope (Label operator (workerName w)) run
-    (seen, running) <$ giveWay
+    (seen, running) <$ yieldReal
 
 -- | What one of them has died of, if it has, the leftmost first. (One whose stop was
 -- requested has not.)
 diedOf :: Sensors -> STM (Maybe SomeException)
 diedOf = foldr orDied (pure Nothing)
  where
-  orDied sensor others = outcomeSoFar sensor >>= maybe others (pure . Just) . (>>= cause)
+  orDied sensor others = tryReadOutcomeSTM sensor >>= maybe others (pure . Just) . (>>= cause)
   cause = \case
     Failing e -> Just e
     Faulted e -> Just e

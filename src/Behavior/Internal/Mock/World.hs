@@ -90,7 +90,7 @@ tell mock entry = do
   goesOn <- isRecorded
   when goesOn $ do
     atomicModifyIORef' (noted mock) (\old -> (entry : old, ()))
-    note (show entry)
+    annotate (show entry)
 
 -- | Puts a remark of your own on record.
 --

@@ -41,7 +41,7 @@ import Behavior.Internal.Simulator
 simulation :: Sim -> Simulator
 simulation sim =
   Simulator
-    { hasTurn = \self -> (== Just self) . taskThread <$> readIORef (current sim)
+    { isRunning = \self -> (== Just self) . taskThread <$> readIORef (current sim)
     , spawn = \label' body publish -> do
         operation sim Free
         me <- readIORef (current sim)
@@ -106,7 +106,7 @@ operation sim op = do
   settle sim
   quick <- keeps sim
   possible' <- if quick then possible sim op else pure False
-  unless possible' (handOn sim op)
+  unless possible' (reschedule sim op)
 {-# INLINE operation #-}
 
 -- | Counts a scheduling point; whether who has the turn keeps it, if it can go on.
@@ -128,7 +128,7 @@ transaction sim act = do
     when (isJust result) (committed sim)
     pure result
   waiting look = do
-    handOn sim (Transaction wouldRun look)
+    reschedule sim (Transaction wouldRun look)
     -- It does run, unless something outside of the simulation undid it just now; or
     -- the run has ended.
     tried >>= \case
@@ -146,8 +146,8 @@ data Undo = Undo
 instance Exception Undo
 
 -- | Lets the others run, as the policy says, and returns when it is the caller's turn.
-handOn :: Sim -> Operation -> IO ()
-handOn sim op = do
+reschedule :: Sim -> Operation -> IO ()
+reschedule sim op = do
   masking <- getMaskingState
   uninterruptibleMask_ $ do
     me <- readIORef (current sim)
@@ -191,7 +191,7 @@ leave sim me publish = do
   unless ending $ do
     settle sim
     _ <- tick sim
-    handOn sim Free `catch` \Unwind -> pure ()
+    reschedule sim Free `catch` \Unwind -> pure ()
   STM.atomically publish
   committed sim
   unless (taskNumber me == 0) (noteStep sim Ends)
