@@ -144,7 +144,6 @@ module Behavior
 
 import Behavior.Internal.Failure
 import Behavior.Internal.Parallel
-import Behavior.Internal.Polled
 import Behavior.Internal.Program
+import Behavior.Internal.Reactive.Polled
 import Behavior.Internal.Runtime
-import Behavior.Internal.Scope

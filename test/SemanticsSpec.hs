@@ -179,7 +179,7 @@ judge world seed =
 
 -- | What is compared. To see 'everything' tells ties apart too, but asks of the simulator
 -- that it records the end of a thread at the moment when others can know of it.
-visible :: Event -> Bool
+visible :: Transition -> Bool
 visible = everything
 
 -- | A small world that goes wrong, for one that does. Each is tried under many

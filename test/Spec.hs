@@ -2,12 +2,12 @@ module Main (main) where
 
 import Test.Hspec
 
-import qualified Behavior.AlarmSpec
+import qualified Behavior.TimerWheelSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
 import qualified Behavior.MonitorSpec
-import qualified Behavior.NewsSpec
+import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
 import qualified Behavior.ParallelSpec
@@ -16,14 +16,14 @@ import qualified Behavior.PollingSpec
 import qualified Behavior.PromisesSpec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
-import qualified Behavior.RefinedSpec
+import qualified Behavior.FilterSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
 import qualified Behavior.STMSpec
 import qualified Behavior.ScopedSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
-import qualified Behavior.StormSpec
+import qualified Behavior.CancellationStressSpec
 import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
 import qualified Examples.DoorBatterySpec
@@ -57,8 +57,8 @@ main = hspec $ do
     Behavior.SignalSpec.spec
     Behavior.PollingSpec.spec
     Behavior.BadReadingSpec.spec
-    Behavior.NewsSpec.spec
-    Behavior.RefinedSpec.spec
+    Behavior.EqualitySuppressionSpec.spec
+    Behavior.FilterSpec.spec
     Behavior.OperatorsSpec.spec
     Behavior.OutcomeSpec.spec
     Behavior.ReactiveSpec.spec
@@ -66,7 +66,7 @@ main = hspec $ do
   describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
   describe "Time" $ do
     Behavior.TimeSpec.spec
-    Behavior.AlarmSpec.spec
+    Behavior.TimerWheelSpec.spec
   describe "STM" Behavior.STMSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
@@ -74,7 +74,7 @@ main = hspec $ do
     Behavior.FromOutsideSpec.spec
     Behavior.ThrowingCleanupSpec.spec
   describe "Promises" Behavior.PromisesSpec.spec
-  describe "Storms" Behavior.StormSpec.spec
+  describe "Storms" Behavior.CancellationStressSpec.spec
   describe "Space" $ do
     Behavior.SpaceSpec.spec
     Behavior.ReactiveSpaceSpec.spec

@@ -24,8 +24,8 @@ module Support
   , hang
 
     -- * The notebook
-  , Notebook
-  , newNotebook
+  , Log
+  , newLog
   , note
   , notes
 
@@ -144,18 +144,18 @@ hang :: IO a
 hang = atomically retry
 
 -- | Who did what, in the order in which it happened.
-newtype Notebook e = Notebook (TVar [e])
+newtype Log e = Log (TVar [e])
 
-newNotebook :: IO (Notebook e)
-newNotebook = Notebook <$> newTVarIO []
+newLog :: IO (Log e)
+newLog = Log <$> newTVarIO []
 
 -- | Notes; it is never blocked, so it cannot be interrupted where exceptions are
 -- masked.
-note :: Notebook e -> e -> IO ()
-note (Notebook events) e = atomically (modifyTVar' events (e :))
+note :: Log e -> e -> IO ()
+note (Log events) e = atomically (modifyTVar' events (e :))
 
-notes :: Notebook e -> IO [e]
-notes (Notebook events) = reverse <$> readTVarIO events
+notes :: Log e -> IO [e]
+notes (Log events) = reverse <$> readTVarIO events
 
 -- | Runs an action in a thread of its own while the second one looks at it and
 -- tampers with it; when that ends, the action is ended too.
@@ -293,7 +293,7 @@ instance Arbitrary End where
   shrink (Succeeds n) = Succeeds <$> shrink n
   shrink _ = [Succeeds 0]
 
-play :: Notebook String -> Script -> IO Int
+play :: Log String -> Script -> IO Int
 play notebook (Script name end) = do
   note notebook name
   case end of
@@ -303,11 +303,11 @@ play notebook (Script name end) = do
     Cancels why -> throwIO (Cancel why)
 
 -- | Both behaviours end alike and do the same in the same order.
-sameAs :: (Eq a, Show a) => (Notebook String -> IO a) -> (Notebook String -> IO a) -> Property
+sameAs :: (Eq a, Show a) => (Log String -> IO a) -> (Log String -> IO a) -> Property
 sameAs one other = ioProperty ((===) <$> observing one <*> observing other)
 
 -- | How an action ended, and what it noted.
-observing :: (Notebook e -> IO a) -> IO (Ending a, [e])
+observing :: (Log e -> IO a) -> IO (Ending a, [e])
 observing act = do
-  notebook <- newNotebook
+  notebook <- newLog
   (,) <$> ending (act notebook) <*> notes notebook

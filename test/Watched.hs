@@ -7,8 +7,8 @@
 module Watched
   ( -- * Conditions
     Says (..)
-  , Dial
-  , newDial
+  , TestCondition
+  , newTestCondition
   , set
   , says
   , watched
@@ -38,8 +38,8 @@ module Watched
   , opened
 
     -- * Occupancy
-  , Room
-  , newRoom
+  , OccupancyCounter
+  , newOccupancyCounter
   , inside
   , mostInside
 
@@ -71,23 +71,23 @@ data Says
   deriving (Eq, Show)
 
 -- | A condition that the test sets.
-type Dial = TVar Says
+type TestCondition = TVar Says
 
-newDial :: Bool -> IO Dial
-newDial = newTVarIO . Says
+newTestCondition :: Bool -> IO TestCondition
+newTestCondition = newTVarIO . Says
 
-set :: Dial -> Says -> IO ()
-set dial = atomically . writeTVar dial
+set :: TestCondition -> Says -> IO ()
+set condition = atomically . writeTVar condition
 
-says :: Dial -> STM Bool
-says dial =
-  readTVar dial >>= \case
+says :: TestCondition -> STM Bool
+says condition =
+  readTVar condition >>= \case
     Says holds -> pure holds
     SaysFailure -> failWith "the sensor"
     SaysFault -> throwSTM (Fault "the sensor")
     SaysNothing -> retry
 
-watched :: Dial -> Signal Bool
+watched :: TestCondition -> Signal Bool
 watched = Signal.watching . says
 
 -- | The signal of a plain variable.
@@ -183,14 +183,14 @@ opened :: Gate -> IO Bool
 opened gate = atomically ((True <$ passed gate) `orElse` pure False)
 
 -- | Where at most one may be at a time.
-data Room = Room (TVar Int) (TVar Int)
+data OccupancyCounter = OccupancyCounter (TVar Int) (TVar Int)
 
-newRoom :: IO Room
-newRoom = Room <$> newTVarIO 0 <*> newTVarIO 0
+newOccupancyCounter :: IO OccupancyCounter
+newOccupancyCounter = OccupancyCounter <$> newTVarIO 0 <*> newTVarIO 0
 
 -- | Acts inside the room.
-inside :: Room -> IO a -> IO a
-inside (Room now most) = bracket_ enter leave
+inside :: OccupancyCounter -> IO a -> IO a
+inside (OccupancyCounter now most) = bracket_ enter leave
  where
   enter = atomically $ do
     modifyTVar' now (+ 1)
@@ -199,8 +199,8 @@ inside (Room now most) = bracket_ enter leave
   leave = atomically (modifyTVar' now (subtract 1))
 
 -- | How many there have been at once, at most.
-mostInside :: Room -> IO Int
-mostInside (Room _ most) = readTVarIO most
+mostInside :: OccupancyCounter -> IO Int
+mostInside (OccupancyCounter _ most) = readTVarIO most
 
 -- | An operator that runs one behaviour while its condition holds.
 data Operator = Operator

@@ -8,7 +8,7 @@ import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
 import Behavior.Parallel (firstOf)
-import Event
+import WorldChange
 import qualified Paper.Chattering as Chattering
 import Robot
 import World
@@ -25,7 +25,7 @@ observe :: String -> Behavior () -> Behavior ()
 observe title behavior = do
   world <- newWorld nearThreshold
   inWorld world (firstOf [behavior, wait world 60])
-  begun <- filter ((== Begins) . happening) <$> happened world
+  begun <- filter ((== Begins) . changeKind) <$> happened world
   let doing second = last (' ' : [mark (action e) | e <- begun, time e <= second])
       timeline = map (doing . (+ 0.5) . fromInteger) [0 .. 59]
       switches = length begun - 1

@@ -18,7 +18,7 @@ import Behavior.Parallel (firstOf)
 import Behavior.STM (readTVarIO)
 import Behavior.Sim (Outcome (..), Run (..), Schedule, defaults, explain, simulateWith)
 import qualified Behavior.Sim as Sim
-import Event
+import WorldChange
 import Options
 import Programs (behavior)
 import Robot (inWorld)
@@ -102,7 +102,7 @@ failedWith :: World -> BehaviorFailed -> Behavior (End, String)
 failedWith world failure = do
   events <- happened world
   pure . (,) RobotFailed $
-    case [" at \"" ++ action e ++ "\": " ++ why | e@Event {happening = Fails why} <- events] of
+    case [" at \"" ++ action e ++ "\": " ++ why | e@WorldChange {changeKind = Fails why} <- events] of
       [] -> ": " ++ displayException failure
       places -> last places
 

@@ -12,7 +12,7 @@ module Tick
 
     -- * Actions
   , action
-  , Happening (..)
+  , ChangeKind (..)
 
     -- * Ticking
   , Clock
@@ -61,7 +61,7 @@ sequenceWithMemory children = do
       remembering = next >>= \status -> status <$ when (status /= Running) restart
   pure Node {tick = remembering, halt = traverse_ halt children >> restart}
 
-data Happening = Started | Succeeded | Halted
+data ChangeKind = Started | Succeeded | Halted
   deriving (Eq, Show)
 
 -- | An action of this name that goes on by itself for so many ticks, and then has
@@ -85,14 +85,14 @@ action clock name duration = do
 data Clock = Clock
   { limit :: Int
   , ticks :: IORef Int
-  , entries :: IORef [(Int, String, Happening)]
+  , entries :: IORef [(Int, String, ChangeKind)]
   }
 
 newClock :: Int -> IO Clock
 newClock n = Clock n <$> newIORef 0 <*> newIORef []
 
 -- | Everything that the actions did: at which tick, which action, and what.
-journal :: Clock -> IO [(Int, String, Happening)]
+journal :: Clock -> IO [(Int, String, ChangeKind)]
 journal clock = reverse <$> readIORef (entries clock)
 
 -- | A tree as a behaviour: ticks it until it has succeeded or failed. It fails, too,

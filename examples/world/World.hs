@@ -74,7 +74,7 @@ import Behavior.STM
   , writeTVar
   )
 import Behavior.Time (now)
-import Event
+import WorldChange
 
 -- | How a world is at first, and what holds in it.
 data Setting = Setting
@@ -139,7 +139,7 @@ data World = World
   , holds :: Condition -> TVar Bool
   -- ^ At first no condition holds.
   , battery :: TVar Battery
-  , history :: TVar (Seq Event)
+  , history :: TVar (Seq WorldChange)
   }
 
 newWorld :: Setting -> IO World
@@ -234,31 +234,31 @@ perform world name effect = mask $ \restore -> do
   record world name (either Fails (const Done)) effect >>= either failWith pure
 
 -- | Puts what a transaction did to an action on record.
-record :: World -> String -> (a -> Happening) -> STM a -> Behavior a
+record :: World -> String -> (a -> ChangeKind) -> STM a -> Behavior a
 record world name how effect = do
   t <- clock world
   atomically $ do
     result <- effect
     percent <- levelAt t <$> readTVar (battery world)
-    modifyTVar' (history world) (|> Event t percent name (how result))
+    modifyTVar' (history world) (|> WorldChange t percent name (how result))
     pure result
 
-unfinished :: SomeException -> Happening
+unfinished :: SomeException -> ChangeKind
 unfinished e@(SomeException inner)
   | Just failure <- fromException e = Fails (displayException (failure :: BehaviorFailed))
   | Just cancellation <- fromException e = interrupted cancellation
   | otherwise = Faults (displayException inner)
  where
-  interrupted :: SomeAsyncException -> Happening
+  interrupted :: SomeAsyncException -> ChangeKind
   interrupted _ = Interrupted
 
 -- | What has happened, from the beginning.
-happened :: World -> Behavior [Event]
+happened :: World -> Behavior [WorldChange]
 happened world = toList <$> readTVarIO (history world)
 
 -- | Tells every event while the behaviour runs, and has told all when it ends. The
 -- robot does not wait for the telling.
-narrating :: World -> (Event -> Behavior ()) -> Behavior a -> Behavior a
+narrating :: World -> (WorldChange -> Behavior ()) -> Behavior a -> Behavior a
 narrating world tell act = do
   told <- newTVarIO 0
   let next = do

@@ -40,7 +40,8 @@ module Behavior.Signal
   , whileHolding
   ) where
 
-import Behavior.Internal.Filter
-import Behavior.Internal.Reactive
-import Behavior.Internal.Sensor
-import Behavior.Internal.Source
+import Behavior.Internal.Reactive.Operators
+import Behavior.Internal.Signal.Filter
+import Behavior.Internal.Signal.Polling
+import Behavior.Internal.Signal.Shared
+import Behavior.Internal.Signal.Source

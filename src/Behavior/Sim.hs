@@ -107,9 +107,9 @@ module Behavior.Sim
   , renderSchedule
   ) where
 
+import Behavior.Internal.Runtime.Backend (Label (..))
 import Behavior.Internal.Sim.Explore
 import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator (Label (..))

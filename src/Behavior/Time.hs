@@ -20,5 +20,5 @@ module Behavior.Time
   , TimedOut (..)
   ) where
 
+import Behavior.Internal.Reactive.Timeout
 import Behavior.Internal.Runtime
-import Behavior.Internal.Time

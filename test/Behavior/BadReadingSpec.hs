@@ -16,8 +16,8 @@ import Test.Hspec
 import Behavior (Failed)
 import Behavior.Internal.Runtime (atomically, now)
 import Behavior.Internal.Scope (SomeBranch (..), requestStopAsync, outcome, structured)
-import Behavior.Internal.Source (startSensors)
-import qualified Behavior.Internal.Source as Source
+import Behavior.Internal.Signal.Source (startSensors)
+import qualified Behavior.Internal.Signal.Source as Source
 import qualified Behavior.Signal as Signal
 import Support
 import Watched
@@ -32,7 +32,7 @@ goingWrong = do
   for_ operators $ \op ->
     for_ faulty $ \(manner, e) ->
       it (unwords [manner, "ends", show op, "after its branch"]) $ do
-        book <- newNotebook
+        book <- newLog
         entered <- newGate
         level <- newSensor $ \_ -> opened entered >>= \isEntered -> if isEntered then throwIO e else pure True
         let main =
@@ -45,7 +45,7 @@ goingWrong = do
 
   for_ faulty $ \(manner, e) ->
     it (manner ++ " the first time starts nothing") $ do
-      book <- newNotebook
+      book <- newLog
       ending (Signal.rSelect (Signal.polling 0.001 (throwIO e)) (note book "l") (note book "r"))
         `shouldReturn` endingOf (Left e)
       notes book `shouldReturn` []
@@ -82,7 +82,7 @@ goingWrong = do
         _ -> CancelledBy (show (Cancel "the caller"))
 
   it "cannot be interrupted has ended before its operator" $ do
-    book <- newNotebook
+    book <- newLog
     started <- newGate
     entered <- newGate
     release <- newGate
@@ -140,7 +140,7 @@ stale :: Spec
 stale = do
   for_ operators $ \op ->
     it ("makes " ++ show op ++ " fail when a reading takes longer, after its branch has ended") $ do
-      book <- newNotebook
+      book <- newLog
       started <- newGate
       level <- newSensor $ \_ -> opened started >>= \isStarted -> if isStarted then hang else pure True
       let main = (open started >> hang) `onException` note book "main is over"
@@ -156,14 +156,14 @@ stale = do
       notes book `shouldReturn` ["main is over" | ran]
 
   it "fails when there is not even a first reading" $ do
-    book <- newNotebook
+    book <- newLog
     let signal = Signal.staleAfter 0.001 (Signal.polling 0.001 hang)
     ending (Signal.rSelect signal (note book "left") (note book "right"))
       `shouldReturn` FailedWith (tooLong "0.001")
     notes book `shouldReturn` []
 
   it "stops the branch in time when the reading cannot be interrupted, and returns after it" $ do
-    book <- newNotebook
+    book <- newLog
     started <- newGate
     stopped <- newGate
     release <- newGate
@@ -189,7 +189,7 @@ stale = do
 
   -- Seen from inside: when the reading began that it knows of.
   it "does not count the time between readings" $ do
-    source <- Source.open (Signal.polling (1 / 0) (pure ())) Source.anything {Source.readingTimes = True}
+    source <- Source.open (Signal.polling (1 / 0) (pure ())) Source.everyValue {Source.readingTimes = True}
     let reading = Source.inFlightSince source
     atomically reading `shouldReturn` Nothing
     structured $ \scope -> do
@@ -201,7 +201,7 @@ stale = do
   it "does not count the time of a recovery, when it was stopped in the middle of a reading" $ do
     entered <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> hang)
-    source <- Source.open (sensing level) Source.anything {Source.readingTimes = True}
+    source <- Source.open (sensing level) Source.everyValue {Source.readingTimes = True}
     let reading = Source.inFlightSince source
     structured $ \scope -> do
       (_, workers) <- startSensors scope "test" source
@@ -218,7 +218,7 @@ stale = do
     entered <- newGate
     mayEnd <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> pass mayEnd)
-    source <- Source.open (Signal.staleAfter 0.001 (sensing level)) Source.anything
+    source <- Source.open (Signal.staleAfter 0.001 (sensing level)) Source.everyValue
     structured $ \scope -> do
       (seen, _) <- startSensors scope "test" source
       let isStale view = atomically ((False <$ Source.firstRead view) `catchSTM` \(_ :: Failed) -> pure True)
@@ -231,8 +231,8 @@ stale = do
       pure (pure ())
 
   it "never fails a signal that is not polled" $ do
-    dial <- newDial True
-    Signal.rSelect (Signal.staleAfter 0.001 (watched dial)) (aWhile 0.001) hang
+    condition <- newTestCondition True
+    Signal.rSelect (Signal.staleAfter 0.001 (watched condition)) (aWhile 0.001) hang
 
   it "watches each of several sources" $ do
     let signal = (&&) <$> Signal.polling 0.001 (pure True) <*> Signal.polling 0.001 hang
@@ -241,7 +241,7 @@ stale = do
 
   for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN")] $ \(limit, shown) ->
     it ("refuses a limit of " ++ shown ++ ", and nothing starts") $ do
-      book <- newNotebook
+      book <- newLog
       let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note book "reading"))
       ending (Signal.rSelect signal (note book "left") (note book "right"))
         `shouldReturn` FaultedWith ("staleAfter: a period is at least 0.000001 seconds, not " ++ shown)

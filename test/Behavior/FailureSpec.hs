@@ -121,7 +121,7 @@ fallbacks = do
       `shouldReturn` (FaultedWith (show DivideByZero), "")
 
   it "does not run the second behaviour when the first is cancelled" $ do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     cancelling ((open inside >> hang) ? note notebook 'r') (pass inside)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
@@ -198,7 +198,7 @@ catchingAny = do
         (\notebook -> tryAny (play notebook a) >>= either (const (play notebook b)) pure)
 
   it "does not keep a caller that is cancelled from stopping" $ do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     cancelling (catchAny (open inside >> hang) (\_ -> note notebook "went on")) (pass inside)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
@@ -285,7 +285,7 @@ attempts = do
 
   it "can be cancelled in every try, and makes no other then" $
     for_ [1 .. 3 :: Int] $ \try' -> do
-      notebook <- newNotebook
+      notebook <- newLog
       inside <- newGate
       let act = do
             note notebook ()
@@ -350,7 +350,7 @@ failingOns = do
     failingOn (\(_ :: Cancel) -> True) (throwIO (Cancel "user")) `shouldThrow` (== Cancel "user")
 
   it "does not keep a caller that is cancelled from stopping" $ do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     cancelling (failingOn everything (open inside >> hang) ? note notebook "went on") (pass inside)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
@@ -398,7 +398,7 @@ isFailing (Script _ (Fails _)) = True
 isFailing _ = False
 
 -- | Plays the scripts in turn, the last again and again.
-inTurn :: [Script] -> Notebook String -> IO Int
+inTurn :: [Script] -> Log String -> IO Int
 inTurn scripts notebook = do
   soFar <- length <$> notes notebook
   play notebook ((scripts ++ repeat (last scripts)) !! soFar)
@@ -434,7 +434,7 @@ instance Arbitrary Expression where
     Over as -> as ++ (Over <$> shrink as)
     a :> b -> [a, b] ++ [a' :> b | a' <- shrink a] ++ [a :> b' | b' <- shrink b]
 
-run :: IORef Int -> Notebook String -> Expression -> IO Int
+run :: IORef Int -> Log String -> Expression -> IO Int
 run count notebook = go
  where
   go expression = case expression of

@@ -111,7 +111,7 @@ usersCode = do
       (atomically (writeTVar level (Key 1)))
       (FaultedWith (show (Fault "equality")))
   it "firstOf, allOf: what was started of a list that ends in an error has ended when that gets out" $ do
-    book <- newNotebook
+    book <- newLog
     for_ [firstOf, void . allOf] $ \operator -> do
       entered <- newGate
       let started = (open entered >> hang) `uninterruptibly` note book "cleaned up"
@@ -131,7 +131,7 @@ usersCode = do
 stoppedFirst :: (Signal k -> Behavior () -> Behavior ()) -> Signal k -> IO () -> Ending () -> IO ()
 stoppedFirst follower signal breakIt expected = do
   entered <- newGate
-  book <- newNotebook
+  book <- newLog
   end <- launching (follower signal ((open entered >> hang) `uninterruptibly` note book "cleaned up")) $ \caller -> do
     pass entered
     breakIt
@@ -155,14 +155,14 @@ undefinedExceptions = do
         beside bottom operator
     it ("withShared, " ++ kind ++ ": ends as a fault, after its sensor has ended") $ do
       reading <- newGate
-      book <- newNotebook
+      book <- newLog
       let sensor = Signal.polling 0.001 ((open reading >> hang) `uninterruptibly` note book "cleaned up")
       ending (Signal.withShared sensor (\_ -> pass reading >> bottom)) `shouldReturn` FaultedWith (show (Fault "undefined"))
       notes book `shouldReturn` ["cleaned up"]
     it ("monitor, " ++ kind ++ ": of the task while it stops, comes after the recovery") $ do
       condition <- newTVarIO False
       entered <- newGate
-      book <- newNotebook
+      book <- newLog
       end <- launching (Signal.monitor (Signal.watching (readTVar condition)) (note book "recovered") ((open entered >> hang) `onException` bottom)) $ \caller -> do
         pass entered
         atomically (writeTVar condition True)
@@ -193,7 +193,7 @@ undefinedExceptions = do
     entered <- newGate
     stopping <- newGate
     mayEnd <- newGate
-    book <- newNotebook
+    book <- newLog
     let slow = (open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd >> note book "cleaned up")
     end <- launching (operator slow (pass entered >> bottom)) $ \caller -> do
       pass stopping

@@ -25,16 +25,16 @@ import Watched
 spec :: Spec
 spec = guarded . describe "monitor" $ do
   it "reads the condition first: when it is true, the recovery runs before the task" $ do
-    book <- newNotebook
-    dial <- newDial True
-    let recovery = note book "recovery" >> set dial (Says False)
-    Signal.monitor (watched dial) recovery (note book "task")
+    book <- newLog
+    condition <- newTestCondition True
+    let recovery = note book "recovery" >> set condition (Says False)
+    Signal.monitor (watched condition) recovery (note book "task")
     notes book `shouldReturn` ["recovery", "task"]
 
   -- The task asks for as many recoveries in a row as the script says, again and again.
   modifyMaxSize (const 15) . prop "recovers until the condition is false, and begins the task anew" $ \script ->
     ioProperty $ do
-      book <- newNotebook
+      book <- newLog
       left <- newTVarIO (map getNonNegative script :: [Int])
       needed <- newTVarIO 0
       let task = do
@@ -51,7 +51,7 @@ spec = guarded . describe "monitor" $ do
 
   for_ [("is done twice, when it is the result of an inner operator", False), ("is done once, when the branch itself records it", True)] $
     \(often, recording) -> it ("work that is interrupted between its end and an inner operator's return " ++ often) $ do
-      book <- newNotebook
+      book <- newLog
       low <- newTVarIO False
       done <- newTVarIO False
       let deliver = sleep 1 >> note book "deliver"
@@ -64,22 +64,22 @@ spec = guarded . describe "monitor" $ do
       notes book `shouldReturn` (if recording then ["deliver", "charge"] else ["deliver", "charge", "deliver"])
 
   it "recovers even if the condition is false again when the task has ended" $ do
-    book <- newNotebook
-    dial <- newDial False
+    book <- newLog
+    condition <- newTestCondition False
     entered <- newGate
     let task = do
           again <- (/= []) <$> notes book
           note book "task"
-          unless again $ (open entered >> hang) `onException` set dial (Says False)
-    launching (Signal.monitor (watched dial) (note book "recovery") task) $ \caller -> do
+          unless again $ (open entered >> hang) `onException` set condition (Says False)
+    launching (Signal.monitor (watched condition) (note book "recovery") task) $ \caller -> do
       pass entered
-      set dial (Says True)
+      set condition (Says True)
       awaitEnd caller `shouldReturn` Gave ()
     notes book `shouldReturn` ["task", "recovery", "task"]
 
   it "starts the recovery only after the task, cleanup included, has ended" $ do
-    book <- newNotebook
-    dial <- newDial False
+    book <- newLog
+    condition <- newTestCondition False
     entered <- newGate
     cleaning <- newGate
     release <- newGate
@@ -91,10 +91,10 @@ spec = guarded . describe "monitor" $ do
               open cleaning
               pass release
               note book "task is over"
-        recovery = note book "recovery" >> set dial (Says False)
-    launching (Signal.monitor (watched dial) recovery task) $ \caller -> do
+        recovery = note book "recovery" >> set condition (Says False)
+    launching (Signal.monitor (watched condition) recovery task) $ \caller -> do
       pass entered
-      set dial (Says True)
+      set condition (Says True)
       pass cleaning
       stillRunning caller
       open release
@@ -102,18 +102,18 @@ spec = guarded . describe "monitor" $ do
     notes book `shouldReturn` ["task", "task is over", "recovery"]
 
   it "runs the recovery to completion, whatever the condition says meanwhile" $ do
-    book <- newNotebook
-    dial <- newDial True
+    book <- newLog
+    condition <- newTestCondition True
     entered <- newGate
     release <- newGate
     let recovery =
           (open entered >> pass release >> note book "recovered")
             `onException` note book "interrupted"
         task = note book "task"
-    launching (Signal.monitor (watched dial) recovery task) $ \caller -> do
+    launching (Signal.monitor (watched condition) recovery task) $ \caller -> do
       pass entered
       for_ [Says False, Says True, SaysFailure, SaysFault, SaysNothing, Says False] $ \news -> do
-        set dial news
+        set condition news
         stillRunning caller
       open release
       awaitEnd caller `shouldReturn` Gave ()
@@ -121,10 +121,10 @@ spec = guarded . describe "monitor" $ do
 
   for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
     it ("starts nothing when after the recovery the condition says " ++ show news) $ do
-      book <- newNotebook
-      dial <- newDial True
-      let recovery = note book "recovery" >> set dial news
-      end <- ending (Signal.monitor (watched dial) recovery (note book "task"))
+      book <- newLog
+      condition <- newTestCondition True
+      let recovery = note book "recovery" >> set condition news
+      end <- ending (Signal.monitor (watched condition) recovery (note book "task"))
       end `shouldBe` case news of
         SaysFailure -> FailedWith "FailedBecause \"the sensor\""
         SaysFault -> FaultedWith (show (Fault "the sensor"))
@@ -132,29 +132,29 @@ spec = guarded . describe "monitor" $ do
       notes book `shouldReturn` ["recovery"]
 
   it "never runs task and recovery at once, however often it recovers" $ do
-    room <- newRoom
-    dial <- newTVarIO False
+    occupancy <- newOccupancyCounter
+    condition <- newTVarIO False
     works <- newTVarIO False
     over <- newGate
     let task =
-          inside room $
+          inside occupancy $
             (atomically (writeTVar works True) >> pass over)
               `onException` (replicateM_ 3 yield >> atomically (writeTVar works False))
-        recovery = inside room (replicateM_ 3 yield >> atomically (writeTVar dial False))
-    launching (Signal.monitor (dialled dial) recovery task) $ \caller -> do
+        recovery = inside occupancy (replicateM_ 3 yield >> atomically (writeTVar condition False))
+    launching (Signal.monitor (dialled condition) recovery task) $ \caller -> do
       for_ [1 .. 500 :: Int] $ \n -> do
-        atomically (writeTVar dial True)
+        atomically (writeTVar condition True)
         -- Two times of three the task may come to run.
         unless (n `mod` 3 == 0) . atomically $
-          (&&) <$> readTVar works <*> (not <$> readTVar dial) >>= check
+          (&&) <$> readTVar works <*> (not <$> readTVar condition) >>= check
       open over
       awaitEnd caller `shouldReturn` Gave ()
-    mostInside room `shouldReturn` 1
+    mostInside occupancy `shouldReturn` 1
 
   it "interrupts, as the outer one, the recovery of an inner one" $ do
-    book <- newNotebook
-    danger <- newDial False
-    low <- newDial True
+    book <- newLog
+    danger <- newTestCondition False
+    low <- newTestCondition True
     entered <- newGate
     let flee = note book "flee" >> set danger (Says False)
         recharge = do
@@ -171,9 +171,9 @@ spec = guarded . describe "monitor" $ do
     notes book `shouldReturn` ["recharge", "unplug", "flee", "recharge", "task"]
 
   it "does not let an inner one interrupt the recovery of the outer one" $ do
-    book <- newNotebook
-    danger <- newDial False
-    low <- newDial False
+    book <- newLog
+    danger <- newTestCondition False
+    low <- newTestCondition False
     let flee = do
           note book "flee"
           set low (Says True)
@@ -189,19 +189,19 @@ spec = guarded . describe "monitor" $ do
 
   for_ [minBound .. maxBound] $ \how ->
     it ("is cancelled, when its recovery then " ++ manner how) $ do
-      book <- newNotebook
-      dial <- newDial True
+      book <- newLog
+      condition <- newTestCondition True
       entered <- newGate
       let recovery = void $ onStop how "recovery" (open entered >> hang)
-          act = leavingNothing (Signal.monitor (watched dial) recovery (note book "task"))
+          act = leavingNothing (Signal.monitor (watched condition) recovery (note book "task"))
       cancelling act (pass entered) `shouldReturn` case how of
         Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "recovery"))
         _ -> CancelledBy (show (Cancel "the caller"))
       notes book `shouldReturn` []
 
   it "does not recover when it is cancelled while the task stops" $ do
-    book <- newNotebook
-    dial <- newDial False
+    book <- newLog
+    condition <- newTestCondition False
     entered <- newGate
     cleaning <- newGate
     release <- newGate
@@ -211,9 +211,9 @@ spec = guarded . describe "monitor" $ do
             -- Interruptible; but nobody asks a second time.
             pass release
             note book "task is over"
-    launching (Signal.monitor (watched dial) (note book "recovery") task) $ \caller -> do
+    launching (Signal.monitor (watched condition) (note book "recovery") task) $ \caller -> do
       pass entered
-      set dial (Says True)
+      set condition (Says True)
       pass cleaning
       -- It is delivered when this returns: the caller waits where it can be interrupted.
       throwTo (asyncThreadId caller) (Cancel "the caller")

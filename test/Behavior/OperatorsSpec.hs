@@ -18,48 +18,48 @@ import Watched
 spec :: Spec
 spec = guarded . for_ operators $ \op -> describe (show op) $ do
   it "starts nothing before the condition has a value" $ do
-    book <- newNotebook
-    dial <- newTVarIO SaysNothing
+    book <- newLog
+    condition <- newTVarIO SaysNothing
     asked <- newGate
     let main = note book "main" >> pure "main"
         other = note book "other" >> pure "other"
-    launching (open asked >> running op (watched dial) main other) $ \caller -> do
+    launching (open asked >> running op (watched condition) main other) $ \caller -> do
       pass asked
       stillRunning caller
       note book "now"
-      set dial (Says True)
+      set condition (Says True)
       awaitEnd caller `shouldReturn` Gave "main"
     notes book `shouldReturn` ["now", "main"]
 
   for_ [SaysFailure, SaysFault] $ \news ->
     it ("starts nothing when the condition at first " ++ show news) $ do
-      book <- newNotebook
-      dial <- newTVarIO news
+      book <- newLog
+      condition <- newTVarIO news
       let branch = note book "ran" >> pure "ran"
-      ending (running op (watched dial) branch branch) >>= (`shouldSatisfy` sensorsOwn news)
+      ending (running op (watched condition) branch branch) >>= (`shouldSatisfy` sensorsOwn news)
       notes book `shouldReturn` []
 
   for_ [("unmasked", id), ("masked", mask_), ("uninterruptible", uninterruptibleMask_)] $
     \(state, masked) ->
       it ("runs every branch unmasked for a caller that is " ++ state) $ do
-        states <- newNotebook
-        dial <- newDial True
+        states <- newLog
+        condition <- newTestCondition True
         entered <- newGate
         let noting = getMaskingState >>= note states
             main = do
               again <- (/= []) <$> notes states
               noting
               if again then pure "main" else open entered >> hang
-            other = noting >> recovered op dial >> pure "other"
-        launching (masked (running op (watched dial) main other)) $ \caller -> do
+            other = noting >> recovered op condition >> pure "other"
+        launching (masked (running op (watched condition) main other)) $ \caller -> do
           pass entered
-          set dial (Says False)
+          set condition (Says False)
           void (awaitEnd caller)
         notes states >>= (`shouldSatisfy` \all' -> not (null all') && all (== Unmasked) all')
 
   it "ends after the cleanup of its branch, though the caller is cancelled twice" $ do
-    book <- newNotebook
-    dial <- newDial True
+    book <- newLog
+    condition <- newTestCondition True
     entered <- newGate
     cleaning <- newGate
     release <- newGate
@@ -69,7 +69,7 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
             pass release
             note book "main is over"
         other = pure "other"
-        act = running op (watched dial) main other `onException` note book "operator is over"
+        act = running op (watched condition) main other `onException` note book "operator is over"
     launching act $ \caller -> do
       pass entered
       throwing (asyncThreadId caller) (Cancel "once")
@@ -86,15 +86,15 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
       cancelling act (pure ()) `shouldReturn` CancelledBy (show (Cancel "the caller"))
 
   it "does not look again while nothing changes that it looks at" $ do
-    dial <- newRecorded True
+    condition <- newRecorded True
     other <- newTVarIO (0 :: Int)
     entered <- newGate
-    launching (running op (recorded dial) (open entered >> hang) hang) $ \caller -> do
+    launching (running op (recorded condition) (open entered >> hang) hang) $ \caller -> do
       pass entered
       awaitIdle (asyncThreadId caller)
-      earlier <- looks dial (const True) True
+      earlier <- looks condition (const True) True
       replicateM_ 1000 (atomically (modifyTVar' other (+ 1)) >> yield)
-      looks dial (const True) True `shouldReturn` earlier
+      looks condition (const True) True `shouldReturn` earlier
 
   for_ [1 .. 3] $ \level -> do
     it ("nested in itself three times, is stopped at level " ++ show level) $ do
@@ -109,19 +109,19 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
       ran `shouldBe` "main" : [show level | operator op == "monitor"]
 
   it "labels every thread with the operator and its branch" $ do
-    events <- newNotebook
-    dial <- newDial True
+    events <- newLog
+    condition <- newTestCondition True
     entered <- newGate
-    visits <- newNotebook
+    visits <- newLog
     let main = do
           note visits ()
           again <- (> 1) . length <$> notes visits
           if again then pure "main" else open entered >> hang
-        other = recovered op dial >> pure "other"
+        other = recovered op condition >> pure "other"
     withSink (note events) $
-      launching (running op (watched dial) main other) $ \caller -> do
+      launching (running op (watched condition) main other) $ \caller -> do
         pass entered
-        set dial (Says False)
+        set condition (Says False)
         void (awaitEnd caller)
     reported <- notes events
     [label | Started label <- reported] `shouldBe` map (Label (operator op)) (branches op)
@@ -143,19 +143,19 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
 -- them, counted from outside, changes while the innermost branch runs.
 nested :: Operator -> Int -> IO () -> IO (Ending String, [String])
 nested op level cleanup = do
-  book <- newNotebook
+  book <- newLog
   entered <- newGate
-  dials <- traverse (const (newDial True)) [1 .. 3 :: Int]
+  dials <- traverse (const (newTestCondition True)) [1 .. 3 :: Int]
   let main = do
         again <- (/= []) <$> notes book
         if again
           then note book "main again" >> pure "main again"
           else note book "main" >> (open entered >> hang) `onException` cleanup
-      other n dial = do
+      other n condition = do
         note book (show n)
-        recovered op dial
+        recovered op condition
         pure (show n)
-      wrap (n, dial) inner = running op (watched dial) inner (other n dial)
+      wrap (n, condition) inner = running op (watched condition) inner (other n condition)
   end <- launching (foldr wrap main (zip [1 :: Int ..] dials)) $ \caller -> do
     pass entered
     set (dials !! (level - 1)) (Says False)
@@ -164,5 +164,5 @@ nested op level cleanup = do
 
 -- | The recovery of @monitor@ makes good what it was started for. (The second branch of
 -- the others would be stopped by that.)
-recovered :: Operator -> Dial -> IO ()
-recovered op dial = when (operator op == "monitor") (set dial (Says True))
+recovered :: Operator -> TestCondition -> IO ()
+recovered op condition = when (operator op == "monitor") (set condition (Says True))

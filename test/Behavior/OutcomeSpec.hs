@@ -39,26 +39,26 @@ stopped =
     for_ [Says False, SaysFailure, SaysFault, SaysNothing] $ \news ->
       for_ [minBound .. maxBound] $ \how ->
         it (unwords [show op ++ ":", reason news ++ ", and the branch", manner how]) $ do
-          room <- newRoom
-          book <- newNotebook
-          dial <- newDial True
+          occupancy <- newOccupancyCounter
+          book <- newLog
+          condition <- newTestCondition True
           entered <- newGate
           let main =
-                inside room $
+                inside occupancy $
                   notes book >>= \case
                     [] -> note book "main" >> onStop how "main" (open entered >> hang)
                     _ -> note book "main again" >> pure "main again"
-              other = inside room $ do
+              other = inside occupancy $ do
                 note book "other"
-                when (operator op == "monitor") (set dial (Says True))
+                when (operator op == "monitor") (set condition (Says True))
                 pure "other"
-          end <- launching (running op (watched dial) main other) $ \caller -> do
+          end <- launching (running op (watched condition) main other) $ \caller -> do
             pass entered
-            set dial news
+            set condition news
             awaitEnd caller
           ran <- notes book
           (end, ran) `shouldBe` expected op news how
-          mostInside room `shouldReturn` 1
+          mostInside occupancy `shouldReturn` 1
  where
   reason = \case
     Says _ -> "the condition changes"
@@ -92,26 +92,26 @@ tied =
     for_ [Says False, SaysFailure, SaysFault, SaysNothing] $ \news ->
       for_ ends $ \(manner, finish, end) ->
         it (unwords [show op ++ ":", manner, "though the condition says", show news]) $ do
-          book <- newNotebook
+          book <- newLog
           thread <- newEmptyTMVarIO
-          dial <- newDial True
+          state <- newTestCondition True
           entered <- newGate
           let main = do
                 note book "main"
                 myThreadId >>= atomically . putTMVar thread
                 open entered
-                atomically (readTVar dial >>= check . (== news))
+                atomically (readTVar state >>= check . (== news))
                 finish
               other = note book "other" >> pure "other"
               condition = Signal.watching $ do
-                said <- readTVar dial
+                said <- readTVar state
                 unless (said == Says True) $
                   readTMVar thread >>= unsafeIOToSTM . awaitOver
-                says dial
+                says state
           result <- launching (running op condition main other) $ \caller -> do
             pass entered
             awaitIdle (asyncThreadId caller)
-            set dial news
+            set state news
             awaitEnd caller
           result `shouldBe` end
           notes book `shouldReturn` ["main"]
@@ -131,8 +131,8 @@ cancelled = do
     for_ operators $ \op ->
       for_ [minBound .. maxBound] $ \how ->
         it (show op ++ state ++ ": is cancelled, if its branch then " ++ manner how) $ do
-          book <- newNotebook
-          dial <- newDial True
+          book <- newLog
+          condition <- newTestCondition True
           entered <- newGate
           let main = do
                 note book "main"
@@ -141,7 +141,7 @@ cancelled = do
               -- A handler for what the branch throws must not run: that the
               -- behaviour was cancelled is the end of the matter.
               caller =
-                try (masked (running op (watched dial) main other)) >>= \case
+                try (masked (running op (watched condition) main other)) >>= \case
                   Left e -> "went on" <$ note book (show (e :: Fault))
                   Right a -> a <$ note book "went on"
           cancelling (leavingNothing caller) (pass entered) `shouldReturn` expected how
@@ -170,7 +170,7 @@ cancelled = do
 -- for a reading that cannot be interrupted.
 afterwards :: Operator -> (IO () -> IO ()) -> IO (Ending (), [String])
 afterwards op masked = do
-  book <- newNotebook
+  book <- newLog
   entered <- newGate
   hanging <- newGate
   release <- newGate
@@ -178,7 +178,7 @@ afterwards op masked = do
     enough <- opened entered
     when enough (uninterruptibleMask_ (open hanging >> pass release))
     pure True
-  threads <- newNotebook
+  threads <- newLog
   let main = (myThreadId >>= note threads) >> note book "main" >> open entered >> pass hanging >> pure "main"
       other = note book "other" >> pure "other"
       act = do
@@ -203,8 +203,8 @@ recovering =
   for_ [minBound .. maxBound] $ \task ->
     for_ [Completing, Failing, Faulting] $ \recovery ->
       it (unwords [manner task, "while it stops, and then", manner recovery]) $ do
-        book <- newNotebook
-        dial <- newDial False
+        book <- newLog
+        condition <- newTestCondition False
         entered <- newGate
         let main =
               notes book >>= \case
@@ -214,11 +214,11 @@ recovering =
                 _ -> note book "task again" >> pure "task again"
             recover = do
               note book "recovery"
-              set dial (Says False)
+              set condition (Says False)
               act recovery
-        end <- launching (Signal.monitor (watched dial) recover main) $ \caller -> do
+        end <- launching (Signal.monitor (watched condition) recover main) $ \caller -> do
           pass entered
-          set dial (Says True)
+          set condition (Says True)
           awaitEnd caller
         (,) end <$> notes book `shouldReturn` expected task recovery
  where

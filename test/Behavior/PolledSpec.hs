@@ -58,7 +58,7 @@ either' = [("rSelect", rSelect), ("monitor", \test main other -> monitor (not <$
 common :: Spec
 common = for_ either' $ \(name, run) -> do
   it (name ++ " reads its test before anything starts") $ do
-    book <- newNotebook
+    book <- newLog
     entered <- newGate
     release <- newGate
     let test = open entered >> pass release >> note book "read" >> pure True
@@ -70,7 +70,7 @@ common = for_ either' $ \(name, run) -> do
     take 2 <$> notes book `shouldReturn` ["read", "main"]
 
   it (name ++ " reads its test again and again, at least 10 ms apart") $ do
-    times <- newNotebook
+    times <- newLog
     let test = True <$ (now >>= note times)
     since <- now
     launching (run test hang (pure ())) $ \_ -> eventually ((>= 6) . length <$> notes times)
@@ -78,19 +78,19 @@ common = for_ either' $ \(name, run) -> do
     zip [0 ..] began `shouldSatisfy` all (\(n, t) -> t - since >= fromIntegral (n :: Int) * 0.01)
 
   it (name ++ " never has both behaviours running, and each time what the test says") $ do
-    room <- newRoom
-    dial <- newTVarIO True
+    occupancy <- newOccupancyCounter
+    condition <- newTVarIO True
     running' <- newTVarIO Nothing
-    let branch own = inside room $ atomically (writeTVar running' (Just own)) >> hang
-    launching (run (readTVarIO dial) (branch True) (branch False)) $ \_ ->
+    let branch own = inside occupancy $ atomically (writeTVar running' (Just own)) >> hang
+    launching (run (readTVarIO condition) (branch True) (branch False)) $ \_ ->
       -- 'monitor' does not end its recovery for a test that changes.
       for_ (take (if name == "monitor" then 1 else 10) (cycle [False, True])) $ \says' -> do
-        atomically (writeTVar dial says')
+        atomically (writeTVar condition says')
         atomically (readTVar running' >>= check . (== Just says'))
-    mostInside room `shouldReturn` 1
+    mostInside occupancy `shouldReturn` 1
 
   it (name ++ " keeps the result of a behaviour that completed though asked to stop") $ do
-    book <- newNotebook
+    book <- newLog
     entered <- newGate
     let main = void (onStop Completing "main" (open entered >> hang)) >> note book "main"
     run (not <$> opened entered) main (note book "other")
@@ -99,7 +99,7 @@ common = for_ either' $ \(name, run) -> do
   for_ [("fails", throwIO Failed, FailedWith "Failed"), ("faults", throwIO (Fault "bug"), FaultedWith (show (Fault "bug")))] $
     \(manner, act, end) ->
       it (name ++ " does not take for false a test that " ++ manner) $ do
-        book <- newNotebook
+        book <- newLog
         entered <- newGate
         let test = opened entered >>= \isEntered -> if isEntered then act else pure True
             main = (open entered >> hang) `onException` note book "main is over"
@@ -109,7 +109,7 @@ common = for_ either' $ \(name, run) -> do
   for_ [("unmasked", id), ("masked", mask_), ("uninterruptible", uninterruptibleMask_)] $
     \(state, masked) ->
       it (name ++ " runs all unmasked for a caller that is " ++ state) $ do
-        states <- newNotebook
+        states <- newLog
         entered <- newGate
         recovered <- newGate
         let noting = getMaskingState >>= note states
@@ -120,7 +120,7 @@ common = for_ either' $ \(name, run) -> do
         notes states >>= (`shouldSatisfy` \all' -> length all' > 3 && all (== Unmasked) all')
 
   it (name ++ " is no failure, but cancelled, under a failingOn for every exception") $ do
-    book <- newNotebook
+    book <- newLog
     entered <- newGate
     let everything = failingOn (\(_ :: SomeException) -> True)
         act = everything (run (pure True) (open entered >> hang) (pure ())) ? note book "went on"
@@ -134,26 +134,26 @@ common = for_ either' $ \(name, run) -> do
 selecting :: Spec
 selecting = do
   it "starts what the test says when the old branch has ended, not when it changed" $ do
-    book <- newNotebook
-    dial <- newTVarIO True
+    book <- newLog
+    condition <- newTVarIO True
     let left = do
           again <- (/= []) <$> notes book
           note book "left"
           unless again $
-            (atomically (writeTVar dial False) >> hang)
-              `onException` atomically (writeTVar dial True)
-    rSelect (readTVarIO dial) left (note book "right")
+            (atomically (writeTVar condition False) >> hang)
+              `onException` atomically (writeTVar condition True)
+    rSelect (readTVarIO condition) left (note book "right")
     notes book `shouldReturn` ["left", "left"]
 
   it "labels its threads" $ do
-    dial <- newTVarIO True
-    started <- startedBy (rSelect (readTVarIO dial) (atomically (writeTVar dial False) >> hang) (pure ()))
+    condition <- newTVarIO True
+    started <- startedBy (rSelect (readTVarIO condition) (atomically (writeTVar condition False) >> hang) (pure ()))
     started `shouldMatchList` map (Label "rSelect") ["polling", "left", "right"]
 
 monitoring :: Spec
 monitoring = do
   it "recharges, begins the task from its beginning, and fulfils it" $ do
-    book <- newNotebook
+    book <- newLog
     battery <- newTVarIO (15 :: Int)
     let drive = do
           note book "enter room"
@@ -165,7 +165,7 @@ monitoring = do
     notes book `shouldReturn` ["enter room", "recharge", "enter room", "perform task"]
 
   it "recovers even if the test is false again when the task has ended" $ do
-    book <- newNotebook
+    book <- newLog
     low <- newTVarIO False
     let task = do
           again <- (/= []) <$> notes book
@@ -200,7 +200,7 @@ monitoring = do
 -- | The labels of the threads that an action starts.
 startedBy :: IO a -> IO [Label]
 startedBy act = do
-  events <- newNotebook
+  events <- newLog
   _ <- withSink (note events) act
   notes events >>= \all' -> pure [label | Started label <- all']
 
@@ -263,7 +263,7 @@ cancelled =
 -- | How the operator ended, and the names of what had ended by then.
 cancelledWhile :: (Probe -> Behavior ()) -> Stopping -> IO (Ending (), [String])
 cancelledWhile act how = do
-  book <- newNotebook
+  book <- newLog
   reached <- newGate
   release <- newGate
   let probe =

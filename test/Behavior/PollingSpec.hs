@@ -28,7 +28,7 @@ spec = guarded $ do
   describe "polling, around a recovery:" recovering
 
 -- | The moments at which readings began and ended, the first reading first.
-type Times = Notebook (Seconds, Seconds)
+type Times = Log (Seconds, Seconds)
 
 -- | A sensor that notes when it was read.
 timed :: Times -> (Int -> Behavior a) -> IO (Sensor a)
@@ -56,7 +56,7 @@ noMoreThan period since times =
 slots :: Spec
 slots = do
   it "readings start at least a period apart" $ do
-    times <- newNotebook
+    times <- newLog
     level <- timed times (pure . (> 50))
     since <- now
     Signal.waitUntil (Signal.polling 0.001 (sensor level))
@@ -64,13 +64,13 @@ slots = do
 
   it "a reading that is late does not delay the slots after it" $
     for_ [1 .. 5] $ \seed -> do
-      book <- newNotebook
+      book <- newLog
       let late = Signal.polling 0.01 (False <$ note book ())
       _ <- simulateWith defaults {slip = 0.004, scheduled = Seeded seed} (Signal.monitor late (pure ()) (sleep 5 ||| forever (sleep 0.0031)))
       notes book >>= (`shouldSatisfy` (`elem` [500, 501])) . length
 
   it "a slow reading skips the slots that it missed, and is not made up for" $ do
-    times <- newNotebook
+    times <- newLog
     level <- timed times $ \n -> do
       began <- now
       when (n == 3) $ eventually ((>= began + 0.01) <$> now)
@@ -81,7 +81,7 @@ slots = do
     noMoreThan 0.001 (snd (all' !! 2)) (drop 3 all')
 
   it "after a slow reading the next one begins in a slot, and not in between" $ do
-    moments <- newNotebook
+    moments <- newLog
     _ <- simulate . Signal.waitUntil . Signal.polling 2 $ do
       now >>= note moments
       n <- length <$> notes moments
@@ -90,7 +90,7 @@ slots = do
     notes moments `shouldReturn` [0, 2, 8, 10]
 
   it "a reading that was stopped has used up its slot" $ do
-    moments <- newNotebook
+    moments <- newLog
     alarm <- newTVarIO False
     let reading = now >>= note moments >> sleep 3
         signal = const <$> dialled alarm <*> Signal.polling 10 reading
@@ -99,7 +99,7 @@ slots = do
     notes moments `shouldReturn` [0, 10, 20, 30]
 
   it "readings start a period apart also when a branch is switched each time" $ do
-    times <- newNotebook
+    times <- newLog
     level <- timed times (\n -> pure (if n > 50 then -1 else n))
     let branch n = unless (n < 0) hang
     since <- now
@@ -107,21 +107,21 @@ slots = do
     notes times >>= \all' -> apart 0.001 all' >> noMoreThan 0.001 since all'
 
   it "readings start a period apart when recovery after recovery takes no time" $ do
-    times <- newNotebook
+    times <- newLog
     level <- timed times (pure . (<= 50))
     since <- now
     Signal.monitor (Signal.polling 0.001 (sensor level)) (pure ()) (pure ())
     notes times >>= \all' -> apart 0.001 all' >> noMoreThan 0.001 since all'
 
   it "one reading runs at a time" $ do
-    room <- newRoom
-    level <- newSensor (inside room . pure)
+    occupancy <- newOccupancyCounter
+    level <- newSensor (inside occupancy . pure)
     Signal.switch (sensing level) (\n -> when (n < 50) hang)
-    mostInside room `shouldReturn` 1
+    mostInside occupancy `shouldReturn` 1
 
   for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN"), (5e-324, "5.0e-324"), (0.0000009, "0.0000009")] $ \(period, shown) -> do
     it ("a period of " ++ shown ++ " is refused, and nothing starts") $ do
-      book <- newNotebook
+      book <- newLog
       let signal = Signal.polling period (True <$ note book "reading")
       ending (Signal.rSelect signal (note book "left") (note book "right"))
         `shouldReturn` FaultedWith ("polling: a period is at least 0.000001 seconds, not " ++ shown)
@@ -136,7 +136,7 @@ counting = do
         `shouldReturn` "l"
 
   it "nothing starts before the first reading has ended" $ do
-    book <- newNotebook
+    book <- newLog
     entered <- newGate
     release <- newGate
     level <- newSensor $ \_ -> do
@@ -152,7 +152,7 @@ counting = do
     take 2 <$> notes book `shouldReturn` ["read", "left"]
 
   it "after a branch has ended a reading is awaited that began after that" $ do
-    book <- newNotebook
+    book <- newLog
     mode <- newTVarIO 'a'
     started <- newGate
     hanging <- newGate
@@ -181,7 +181,7 @@ counting = do
     notes book `shouldReturn` ["a is over", "the reading ends", "b: begun after"]
 
   it "a change that is over when the old branch has ended starts that branch anew" $ do
-    book <- newNotebook
+    book <- newLog
     closed <- newTVarIO True
     level <- newSensor (const (readTVarIO closed))
     let left =
@@ -210,8 +210,8 @@ counting = do
         masked (Signal.switch (sensing level) pure) `shouldReturn` Unmasked
 
   it "all readings run in one thread, with a label" $ do
-    events <- newNotebook
-    threads <- newNotebook
+    events <- newLog
+    threads <- newLog
     level <- newSensor $ \n -> (n > 5) <$ (myThreadId >>= note threads)
     withSink (note events) (Signal.waitUntil (sensing level))
     notes events
@@ -222,7 +222,7 @@ counting = do
 -- is under way, and whose sensor is just being read, once the gate is open. From then
 -- on each reading does as the test says, by its number from 1.
 data Scene = Scene
-  { history :: Notebook String
+  { history :: Log String
   , trigger :: TVar Bool
   , underWay :: Gate
   , monitoring :: Behavior ()
@@ -230,7 +230,7 @@ data Scene = Scene
 
 scene :: (Gate -> Int -> Behavior ()) -> IO Scene
 scene act = do
-  notebook <- newNotebook
+  notebook <- newLog
   variable <- newTVarIO False
   started <- newGate
   entered <- newGate
@@ -296,7 +296,7 @@ recovering = do
     notes (history s) `shouldReturn` ["task", "recovery", "the reading ends", "task"]
 
   it "a recovery that comes before any task does not wait for a slow reading either" $ do
-    book <- newNotebook
+    book <- newLog
     low <- newTVarIO Nothing
     entered <- newGate
     release <- newGate

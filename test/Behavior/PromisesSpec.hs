@@ -38,7 +38,7 @@ isCancelled = CancelledBy (show theCancel)
 cancelled :: Spec
 cancelled = do
   inEach places "throws the same exception when what it ran has ended, however slow its cleanup" $ \place -> do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     cleaning <- newGate
     mayEnd <- newGate
@@ -56,7 +56,7 @@ cancelled = do
       notes notebook `shouldReturn` ["cleaned up"]
 
   inEach places "does not leave what it ran when it is cancelled again, and again, meanwhile" $ \place -> do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     cleaning <- newGate
     mayEnd <- newGate
@@ -76,7 +76,7 @@ cancelled = do
       notes notebook `shouldReturn` ["cleaned up"]
 
   inEach threaded "asks what it runs just once: a second cancellation does not interrupt the cleanup" $ \place -> do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     cleaning <- newGate
     mayEnd <- newGate
@@ -106,7 +106,7 @@ cancelled = do
       `shouldReturn` CancelledWithFault (show theCancel) (show (Fault "cleanup"))
 
   inEach threaded "does not go on behind a handler for the fault of a cleanup" $ \place -> do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     let act = placed place ((open inside >> hang) `onException` throwIO (Fault "cleanup"))
         handled = void (try act :: IO (Either Fault ())) >> note notebook "went on"
@@ -115,7 +115,7 @@ cancelled = do
     notes notebook `shouldReturn` []
 
   inEach threaded "takes neither a failure nor a result of what it stops for the end of the matter" $ \place -> do
-    notebook <- newNotebook
+    notebook <- newLog
     forM_ [failed, pure ()] $ \end -> do
       inside <- newGate
       let act = (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> end
@@ -124,7 +124,7 @@ cancelled = do
     notes notebook `shouldReturn` []
 
   inEach threaded "is not told of a deadlock while it waits for a cleanup that is" $ \place -> do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     cleaning <- newGate
     recovered <- newGate
@@ -182,7 +182,7 @@ branches = do
     ending (placed place (myThreadId >>= killThread)) `shouldReturn` CancelledBy (show ThreadKilled)
 
   inEach threaded "faults past every handler when an operator stops it" $ \place -> do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     let act = placed place ((open inside >> hang) `onException` throwIO (Fault "cleanup"))
         handled = void (try act :: IO (Either Fault ())) >> note notebook "went on"
@@ -228,7 +228,7 @@ nested = do
 
   inEach places "are all stopped, in any order of nesting, when the outermost is cancelled" $ \place ->
     forM_ places $ \place' -> do
-      notebook <- newNotebook
+      notebook <- newLog
       inside <- newGate
       let act = (open inside >> hang) `onException` note notebook (show place')
       end <- cancelling (leavingNothing (placed place (placed place' act))) (pass inside)
@@ -237,7 +237,7 @@ nested = do
 
   inEach places "are all stopped through threads of async's, and handlers that rethrow" $ \place ->
     forM_ places $ \place' -> do
-      notebook <- newNotebook
+      notebook <- newLog
       inside <- newGate
       let act = (open inside >> hang) `onException` note notebook (show place')
           between inner = race_ (inner `catch` \(e :: SomeException) -> throwIO e) hang

@@ -23,18 +23,18 @@ spec :: Spec
 spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In constant memory run" $ do
   it "a million reselections by rSelect, one branch at a time" $
     inConstantMemory 1000000 $ \step -> do
-      room <- newRoom
-      dial <- newTVarIO True
+      occupancy <- newOccupancyCounter
+      condition <- newTVarIO True
       left <- newTVarIO (1000000 :: Int)
-      let branch = inside room $ do
+      let branch = inside occupancy $ do
             step
             over <- atomically $ do
               modifyTVar' left (subtract 1)
-              modifyTVar' dial not
+              modifyTVar' condition not
               (<= 0) <$> readTVar left
             unless over hang
-      Signal.rSelect (dialled dial) branch branch
-      mostInside room `shouldReturn` 1
+      Signal.rSelect (dialled condition) branch branch
+      mostInside occupancy `shouldReturn` 1
 
   it "a million recoveries by monitor" $
     inConstantMemory 1000000 $ \step -> do
@@ -44,19 +44,19 @@ spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In co
 
   it "a million interruptions by monitor, and as many recoveries, one behaviour at a time" $
     inConstantMemory 1000000 $ \step -> do
-      room <- newRoom
-      dial <- newTVarIO False
+      occupancy <- newOccupancyCounter
+      condition <- newTVarIO False
       left <- newTVarIO (1000000 :: Int)
-      let task = inside room $ do
+      let task = inside occupancy $ do
             step
             over <- atomically $ do
               modifyTVar' left (subtract 1)
-              writeTVar dial True
+              writeTVar condition True
               (<= 0) <$> readTVar left
             unless over hang
-          recovery = inside room (atomically (writeTVar dial False))
-      Signal.monitor (dialled dial) recovery task
-      mostInside room `shouldReturn` 1
+          recovery = inside occupancy (atomically (writeTVar condition False))
+      Signal.monitor (dialled condition) recovery task
+      mostInside occupancy `shouldReturn` 1
 
   it "a hundred thousand recoveries on a signal that needs a thread, each time a new one" $
     inConstantMemory 100000 $ \step -> do

@@ -65,8 +65,8 @@ selecting = do
   -- one is another than its own: then it waits to be stopped.
   prop "runs what the condition says, change after change" $ \first script ->
     ioProperty $ do
-      book <- newNotebook
-      dial <- newTVarIO first
+      book <- newLog
+      condition <- newTVarIO first
       rest <- newTVarIO script
       let branch own = do
             note book own
@@ -75,47 +75,47 @@ selecting = do
               writeTVar rest (drop 1 others)
               case others of
                 [] -> True <$ pure same
-                next : _ -> False <$ writeTVar dial next
+                next : _ -> False <$ writeTVar condition next
             unless over hang
-      Signal.rSelect (dialled dial) (branch True) (branch False)
+      Signal.rSelect (dialled condition) (branch True) (branch False)
       ([key | key : _ <- group (first : script)] ===) <$> notes book
 
   it "never runs both branches at once, however the condition flickers" $ do
-    room <- newRoom
-    dial <- newTVarIO True
+    occupancy <- newOccupancyCounter
+    condition <- newTVarIO True
     runs <- newTVarIO Nothing
     over <- newGate
     let branch own =
-          inside room $
+          inside occupancy $
             (atomically (writeTVar runs (Just own)) >> pass over)
               `onException` replicateM_ 3 yield
-    launching (Signal.rSelect (dialled dial) (branch True) (branch False)) $ \caller -> do
+    launching (Signal.rSelect (dialled condition) (branch True) (branch False)) $ \caller -> do
       for_ [1 .. 500 :: Int] $ \n -> do
-        atomically (modifyTVar' dial not)
+        atomically (modifyTVar' condition not)
         -- Two times of three what the condition says may come to run.
         unless (n `mod` 3 == 0) . atomically $
-          (==) <$> readTVar runs <*> (Just <$> readTVar dial) >>= check
+          (==) <$> readTVar runs <*> (Just <$> readTVar condition) >>= check
       open over
       awaitEnd caller `shouldReturn` Gave ()
-    mostInside room `shouldReturn` 1
+    mostInside occupancy `shouldReturn` 1
 
   it "runs an instant branch exactly once, however the condition flickers" $ do
-    room <- newRoom
-    dial <- newTVarIO True
+    occupancy <- newOccupancyCounter
+    condition <- newTVarIO True
     ran <- newTVarIO (0 :: Int)
     -- Masked, it runs wholly or not at all: a run that counts has completed, and must be
     -- the only one.
-    let branch = mask_ (inside room (atomically (modifyTVar' ran (+ 1))))
-        flicker = replicateM_ 20 (atomically (modifyTVar' dial not) >> yield)
+    let branch = mask_ (inside occupancy (atomically (modifyTVar' ran (+ 1))))
+        flicker = replicateM_ 20 (atomically (modifyTVar' condition not) >> yield)
     replicateM_ 500 . launching flicker $ \flickering -> do
-      Signal.rSelect (dialled dial) branch branch
+      Signal.rSelect (dialled condition) branch branch
       awaitEnd flickering `shouldReturn` Gave ()
     readTVarIO ran `shouldReturn` 500
-    mostInside room `shouldReturn` 1
+    mostInside occupancy `shouldReturn` 1
 
   it "does what the condition says when the old branch has ended, not when it changed" $ do
-    book <- newNotebook
-    dial <- newTVarIO 'a'
+    book <- newLog
+    condition <- newTVarIO 'a'
     entered <- newGate
     cleaning <- newGate
     release <- newGate
@@ -126,18 +126,18 @@ selecting = do
             pass release
             note book "a is over"
         branch key = note book [key]
-    launching (Signal.switch (dialled dial) branch) $ \caller -> do
+    launching (Signal.switch (dialled condition) branch) $ \caller -> do
       pass entered
-      atomically (writeTVar dial 'b')
+      atomically (writeTVar condition 'b')
       pass cleaning
-      atomically (writeTVar dial 'c')
+      atomically (writeTVar condition 'c')
       open release
       awaitEnd caller `shouldReturn` Gave ()
     notes book `shouldReturn` ["a", "a is over", "c"]
 
   it "runs the same branch anew when the condition has changed back meanwhile" $ do
-    book <- newNotebook
-    dial <- newTVarIO True
+    book <- newLog
+    condition <- newTVarIO True
     entered <- newGate
     let left =
           notes book >>= \before ->
@@ -145,25 +145,25 @@ selecting = do
               then do
                 note book "left"
                 -- The cleanup itself turns the condition back.
-                (open entered >> hang) `onException` atomically (writeTVar dial True)
+                (open entered >> hang) `onException` atomically (writeTVar condition True)
               else note book "left again"
         right = note book "right"
-    launching (Signal.rSelect (dialled dial) left right) $ \caller -> do
+    launching (Signal.rSelect (dialled condition) left right) $ \caller -> do
       pass entered
-      atomically (writeTVar dial False)
+      atomically (writeTVar condition False)
       awaitEnd caller `shouldReturn` Gave ()
     notes book `shouldReturn` ["left", "left again"]
 
   for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
     it ("starts nothing when the condition, read again, says " ++ show news) $ do
-      book <- newNotebook
-      dial <- newDial True
+      book <- newLog
+      condition <- newTestCondition True
       entered <- newGate
-      let left = note book "left" >> (open entered >> hang) `onException` set dial news
+      let left = note book "left" >> (open entered >> hang) `onException` set condition news
           right = note book "right"
-      launching (Signal.rSelect (watched dial) left right) $ \caller -> do
+      launching (Signal.rSelect (watched condition) left right) $ \caller -> do
         pass entered
-        set dial (Says False)
+        set condition (Says False)
         awaitEnd caller `shouldReturn` expected news
       notes book `shouldReturn` ["left"]
 
@@ -189,7 +189,7 @@ data Mode = Search | Fetch | Rest
 switching :: Spec
 switching =
   it "has a branch for each value of any type that can be compared" $ do
-    book <- newNotebook
+    book <- newLog
     mode <- newTVarIO Search
     let become next = atomically (writeTVar mode next)
         behave Search = note book "search" >> become Fetch >> hang
@@ -201,7 +201,7 @@ switching =
 rules :: Spec
 rules = do
   it "gives way to an earlier rule, and not to a later one" $ do
-    book <- newNotebook
+    book <- newLog
     [first, second, third] <- traverse newTVarIO [False, True, False]
     let turn variable = atomically . writeTVar variable
         one = note book "first"
@@ -217,7 +217,7 @@ rules = do
     notes book `shouldReturn` ["second", "second goes on", "first"]
 
   it "goes on to the next rule that holds when its own no longer does" $ do
-    book <- newNotebook
+    book <- newLog
     first <- newTVarIO True
     let one = note book "first" >> atomically (writeTVar first False) >> hang
     Signal.teleoReactive
@@ -225,7 +225,7 @@ rules = do
     notes book `shouldReturn` ["first", "third"]
 
   it "waits while no rule holds, at first and later" $ do
-    book <- newNotebook
+    book <- newLog
     hungry <- newTVarIO False
     tired <- newTVarIO False
     entered <- newGate
@@ -244,40 +244,40 @@ rules = do
     notes book `shouldReturn` ["eat", "now", "sleep"]
 
   it "fails when a condition does, also while no rule holds" $ do
-    dial <- newDial False
-    launching (Signal.teleoReactive [(watched dial, pure ()), (pure False, pure ())]) $ \caller -> do
+    condition <- newTestCondition False
+    launching (Signal.teleoReactive [(watched condition, pure ()), (pure False, pure ())]) $ \caller -> do
       stillRunning caller
-      set dial SaysFailure
+      set condition SaysFailure
       awaitEnd caller `shouldReturn` FailedWith "FailedBecause \"the sensor\""
 
 waiting :: Spec
 waiting = do
   it "returns when the condition holds, and not before" $ do
-    dial <- newDial False
-    launching (Signal.waitUntil (watched dial)) $ \caller -> do
+    condition <- newTestCondition False
+    launching (Signal.waitUntil (watched condition)) $ \caller -> do
       stillRunning caller
-      set dial (Says True)
+      set condition (Says True)
       awaitEnd caller `shouldReturn` Gave ()
 
   for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
     it ("takes for an end, and not for false, that the condition says " ++ show news) $ do
-      dial <- newDial False
-      launching (Signal.waitUntil (watched dial)) $ \caller -> do
+      condition <- newTestCondition False
+      launching (Signal.waitUntil (watched condition)) $ \caller -> do
         stillRunning caller
-        set dial news
+        set condition news
         awaitEnd caller >>= (`shouldSatisfy` (/= Gave ()))
 
   it "can be cancelled" $ do
-    dial <- newDial False
-    cancelling (Signal.waitUntil (watched dial)) (pure ())
+    condition <- newTestCondition False
+    cancelling (Signal.waitUntil (watched condition)) (pure ())
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
 
 holding :: Spec
 holding =
   it "fails, once its branch has ended, when the condition stops holding" $ do
-    book <- newNotebook
-    dial <- newDial True
-    let grip = note book "grip" >> (set dial (Says False) >> hang) `onException` note book "let go"
-    end <- ending (Signal.whileHolding (watched dial) grip `onException` note book "failed")
+    book <- newLog
+    condition <- newTestCondition True
+    let grip = note book "grip" >> (set condition (Says False) >> hang) `onException` note book "let go"
+    end <- ending (Signal.whileHolding (watched condition) grip `onException` note book "failed")
     end `shouldBe` (FailedWith "FailedBecause \"the condition does not hold\"" :: Ending ())
     notes book `shouldReturn` ["grip", "let go", "failed"]

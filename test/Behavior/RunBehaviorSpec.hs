@@ -40,7 +40,7 @@ spec = guarded . describe "runBehavior" $ do
 
   for_ [(sigINT, sigTERM, "SIGINT", 130), (sigTERM, sigINT, "SIGTERM", 143)] $ \(signal, otherSignal, name, code) -> do
     it ("ends with " ++ show code ++ " after a " ++ name ++ ", when the cleanups have ended") $ do
-      notebook <- newNotebook
+      notebook <- newLog
       cleaning <- newGate
       mayEnd <- newGate
       let act = uninterruptibly (raiseSignal signal >> hang) $ do
@@ -175,7 +175,7 @@ spec = guarded . describe "runBehavior" $ do
 
   it "waits for an action in runInBoundThread, which nothing interrupts" $
     when rtsSupportsBoundThreads $ do
-      notebook <- newNotebook
+      notebook <- newLog
       inside <- newGate
       mayEnd <- newGate
       let act = runInBoundThread (open inside >> pass mayEnd >> note notebook "to its end")
@@ -191,7 +191,7 @@ spec = guarded . describe "runBehavior" $ do
 
   it "interrupts an action in a bound thread that withAsyncBound has started" $
     when rtsSupportsBoundThreads $ do
-      notebook <- newNotebook
+      notebook <- newLog
       inside <- newGate
       let act = (open inside >> hang) `onException` note notebook "cleaned up"
       cancelling (runBehavior (withAsyncBound act wait)) (pass inside)
@@ -199,7 +199,7 @@ spec = guarded . describe "runBehavior" $ do
       notes notebook `shouldReturn` ["cleaned up"]
 
   it "does not return before the behaviour has ended when its caller is cancelled" $ do
-    notebook <- newNotebook
+    notebook <- newLog
     inside <- newGate
     let act = (open inside >> hang) `onException` note notebook "cleaned up"
     cancelling (leavingNothing (runBehavior act)) (pass inside)

@@ -17,7 +17,7 @@ import GHC.Conc.Sync (threadLabel)
 #endif
 import Test.Hspec hiding (parallel)
 
-import Behavior (Failed (..), both, failed, parallel)
+import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
 import qualified Behavior.Signal as Signal
@@ -126,7 +126,7 @@ interrupting = do
 reporting :: Spec
 reporting = do
   it "reports the start and the end of each thread, in the thread itself, masked" $ do
-    notebook <- newNotebook
+    notebook <- newLog
     let sink event = (,,) event <$> myThreadId <*> getMaskingState >>= note notebook
     thread <- withSink sink $ do
       thread <- mask_ (start label (pure ()))
@@ -279,7 +279,7 @@ scopes = do
 
   it "lets nothing that arrives while branches stop wait until a handler of the caller's runs" $
     void . explore (randomly 1000) $ \simulated -> do
-      notebook <- newNotebook
+      notebook <- newLog
       let operator = both (sleep 1 >> failed) (sleep 2)
           handled = operator `catch` \(_ :: Failed) -> allowInterrupt `onException` note notebook "in the handler"
       _ <- simulated (parallel handled (sleep 1))

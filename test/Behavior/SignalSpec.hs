@@ -26,26 +26,26 @@ spec = guarded $ do
 watchingIt :: Spec
 watchingIt = do
   it "waits for a first value, and later takes its absence for an end" $ do
-    dial <- newTVarIO SaysNothing
+    condition <- newTVarIO SaysNothing
     entered <- newGate
-    launching (Signal.rSelect (watched dial) (open entered >> hang) hang) $ \caller -> do
+    launching (Signal.rSelect (watched condition) (open entered >> hang) hang) $ \caller -> do
       stillRunning caller
-      set dial (Says True)
+      set condition (Says True)
       pass entered
-      set dial SaysNothing
+      set condition SaysNothing
       awaitEnd caller `shouldReturn` lost
 
   it "is not misled by a value that is back by the time it looks" $ do
-    dial <- newDial True
+    condition <- newTestCondition True
     entered <- newGate
-    let branch = open entered >> atomically (readTVar dial >>= check . (== Says False)) >> hang
+    let branch = open entered >> atomically (readTVar condition >>= check . (== Says False)) >> hang
         -- The value goes and comes in one transaction: nobody can see it gone.
-        flicker = atomically (writeTVar dial SaysNothing >> writeTVar dial (Says True))
-    launching (Signal.rSelect (watched dial) branch (pure "right")) $ \caller -> do
+        flicker = atomically (writeTVar condition SaysNothing >> writeTVar condition (Says True))
+    launching (Signal.rSelect (watched condition) branch (pure "right")) $ \caller -> do
       pass entered
       flicker
       stillRunning caller
-      set dial (Says False)
+      set condition (Says False)
       awaitEnd caller `shouldReturn` Gave "right"
  where
   lost = FailedWith "FailedBecause \"the signal has no value any more\"" :: Ending ()
@@ -69,7 +69,7 @@ several = do
       awaitEnd caller `shouldReturn` Gave ('a', 'b')
 
   it "changes once when one transaction changes several" $ do
-    book <- newNotebook
+    book <- newLog
     first <- newTVarIO (0 :: Int)
     second <- newTVarIO (0 :: Int)
     let branch key = do
@@ -93,7 +93,7 @@ several = do
 -- | The labels of the threads that an action starts.
 started :: IO a -> IO [Label]
 started act = do
-  events <- newNotebook
+  events <- newLog
   _ <- withSink (note events) act
   notes events >>= \all' -> pure [label | Started label <- all']
 
@@ -168,7 +168,7 @@ sharing = do
       `shouldReturn` (FaultedWith (show (Fault "body")) :: Ending ())
 
   it "is closed when the body has ended: to use it then is a fault, and starts nothing" $ do
-    book <- newNotebook
+    book <- newLog
     leaked <- Signal.withShared (pure True) pure
     ending (Signal.rSelect leaked (note book "left") (note book "right")) `shouldReturn` closed
     notes book `shouldReturn` []
@@ -187,7 +187,7 @@ sharing = do
     opened over `shouldReturn` True
 
   it "refuses a bad signal before it starts the body" $ do
-    book <- newNotebook
+    book <- newLog
     ending (Signal.withShared (Signal.polling 0 (pure ())) (\_ -> note book "body"))
       `shouldReturn` FaultedWith "polling: a period is at least 0.000001 seconds, not 0.0"
     notes book `shouldReturn` []

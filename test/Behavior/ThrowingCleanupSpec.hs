@@ -72,11 +72,11 @@ fromCleanups = do
   it "storms of them, by threads of their own, in nested operators: all end, and nothing is orphaned" $
     replicateM_ 20 $ do
       gates <- mapM (const newGate) [1 .. 4 :: Int]
-      room <- newTVarIO (0 :: Int)
+      occupancy <- newTVarIO (0 :: Int)
       end <- launching (do
         me <- myThreadId
         let throwing' target e = void (forkIO (throwTo target (Fault e)))
-            stormy n cleanup = counted room (branch (gates !! n) cleanup)
+            stormy n cleanup = counted occupancy (branch (gates !! n) cleanup)
             nested n m = do
               self <- myThreadId
               parallel (stormy n (throwing' self "inner")) (stormy m (throwing' me "outer"))
@@ -86,7 +86,7 @@ fromCleanups = do
         FaultedWith _ -> True
         CancelledWithFault _ _ -> True
         _ -> False
-      readTVarIO room `shouldReturn` 0
+      readTVarIO occupancy `shouldReturn` 0
  where
   masks =
     [ ("masked", id)
@@ -97,10 +97,10 @@ fromCleanups = do
   stopping operator cleanup = do
     entered <- newGate
     launching (myThreadId >>= \me -> operator (branch entered (cleanup me)) (pass entered)) awaitEnd
-  counted room act =
+  counted occupancy act =
     mask $ \restore -> do
-      atomically (readTVar room >>= writeTVar room . (+ 1))
-      restore act `finally` uninterruptibleMask_ (atomically (readTVar room >>= writeTVar room . subtract 1))
+      atomically (readTVar occupancy >>= writeTVar occupancy . (+ 1))
+      restore act `finally` uninterruptibleMask_ (atomically (readTVar occupancy >>= writeTVar occupancy . subtract 1))
 
 -- | Its operator asks it, and is interrupted before it has heard.
 slowToHear :: Spec
@@ -137,7 +137,7 @@ expired outerFirst stopping mayEnd act = do
   inner <- newLimit
   outer <- newLimit
   later <- newGate
-  book <- newNotebook
+  book <- newLog
   let caller = do
         result <- limited outer (limited inner act >>= \r -> note book "between" >> pure r)
         open later
@@ -155,10 +155,10 @@ expired outerFirst stopping mayEnd act = do
 -- 'System.Timeout.timeout'.
 data Limit = Limit Gate (Gate, ThreadIdBox)
 
-type ThreadIdBox = Notebook ThreadId
+type ThreadIdBox = Log ThreadId
 
 newLimit :: IO Limit
-newLimit = (\trigger set box -> Limit trigger (set, box)) <$> newGate <*> newGate <*> newNotebook
+newLimit = (\trigger set box -> Limit trigger (set, box)) <$> newGate <*> newGate <*> newLog
 
 newtype Expired = Expired ThreadId
   deriving (Eq, Show)

@@ -128,7 +128,7 @@ timeouts = do
       `shouldReturn` (FailedWith (show (TimedOut 0)), "")
 
   it "does not start it then under any schedule" . void . explore (randomly 100) $ \simulated -> do
-    notebook <- newNotebook
+    notebook <- newLog
     _ <- simulated (timeout 0 (note notebook 'a'))
     notes notebook `shouldReturn` ""
 

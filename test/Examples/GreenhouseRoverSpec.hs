@@ -62,7 +62,7 @@ missions = do
     (found, world) <- inspecting [Bed North 1, Bed North 2] calm {pictures = hanging}
     found `shouldBe` Map.fromList [(Bed North 1, NotSeen "timed out after 2.0 s"), seen (Bed North 2)]
     record <- happened world
-    [happenedAt e | e <- entries record, subject e == "camera", argument e == "Bed North 1", happening e == Begins]
+    [entryTime e | e <- entries record, subject e == "camera", argument e == "Bed North 1", entryKind e == Begins]
       `shouldBe` [2.25, 5.25, 8.25]
   it "opens the door only while no-one is near" $ do
     (_, world) <- inspecting [Bed South 1] calm {someone = [(0, True), (5, False), (5.3, True), (7, False)]}

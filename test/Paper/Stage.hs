@@ -33,8 +33,8 @@ import Test.Hspec (shouldBe)
 import Behavior (Behavior, Failed (..), failWith)
 import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Time (atomically)
-import Event (Event (action, happening), Happening)
-import qualified Event
+import WorldChange (ChangeKind, WorldChange (action, changeKind))
+import qualified WorldChange
 import Robot (inWorld)
 import Support (Ending (..), ending, hang)
 import World
@@ -68,25 +68,25 @@ data Step
   | FailedTo String String
   | InterruptedIn String
   | FaultedIn String String
-  | OutOfTurn String Happening
+  | OutOfTurn String ChangeKind
   deriving (Eq, Show)
 
-steps :: [Event] -> [Step]
+steps :: [WorldChange] -> [Step]
 steps = \case
   begun : ended : others
-    | happening begun == Event.Begins
+    | changeKind begun == WorldChange.Begins
     , action begun == action ended
-    , Just step <- endOf (action ended) (happening ended) ->
+    , Just step <- endOf (action ended) (changeKind ended) ->
         step : steps others
-  event : others -> OutOfTurn (action event) (happening event) : steps others
+  event : others -> OutOfTurn (action event) (changeKind event) : steps others
   [] -> []
  where
   endOf name = \case
-    Event.Begins -> Nothing
-    Event.Done -> Just (Did name)
-    Event.Fails why -> Just (FailedTo name (fromMaybe why (stripPrefix (announcing "") why)))
-    Event.Interrupted -> Just (InterruptedIn name)
-    Event.Faults what -> Just (FaultedIn name what)
+    WorldChange.Begins -> Nothing
+    WorldChange.Done -> Just (Did name)
+    WorldChange.Fails why -> Just (FailedTo name (fromMaybe why (stripPrefix (announcing "") why)))
+    WorldChange.Interrupted -> Just (InterruptedIn name)
+    WorldChange.Faults what -> Just (FaultedIn name what)
   announcing = displayException . FailedBecause
 
 -- | How a listing ends that fails for this reason.

@@ -39,7 +39,7 @@ data Clause = Structure | Exclusion | Work | FaultOut | Masking | Outcomes | Lab
 data Theatre = Theatre
   { stage :: Stage
   , language :: Language
-  , weather :: TVar Int
+  , input :: TVar Int
   , complaints :: Journal (Clause, String)
   , named :: IORef (Map ThreadId Label)
   }
@@ -57,7 +57,7 @@ obeys clause stage' language' (Program tree deeds state) = do
           Left e | cancelledBy (endingOf (end :: Either SomeException Int)) -> throwIO e
           -- Whoever was cancelled and goes on waits for ever.
           _ -> if any (stopsIt . snd) deeds then hang else either throwIO pure end
-      whole = calling stage' (atomically . writeTVar (weather theatre)) deeds caller
+      whole = calling stage' (atomically . writeTVar (input theatre)) deeds caller
   end <- (if clause == Labels then withSink (labelling theatre) else id) (run stage' whole)
   case end of
     Gave outcome
@@ -122,20 +122,20 @@ grow t = \case
   Beside as b -> observed t "scoped" Concurrent [] $ \branch ->
     L.beside l [void (branch n "fork" a) | (n, a) <- zip [2 ..] as] (branch 1 "body" b)
   Select look a b -> observed t "rSelect" Reactive [] $ \branch ->
-    L.rSelect l (odd <$> sky look) (branch 0 "left" a) (branch 0 "right" b)
+    L.rSelect l (odd <$> inputBy look) (branch 0 "left" a) (branch 0 "right" b)
   Monitor look a b -> observed t "monitor" Reactive [] $ \branch ->
-    L.monitor l ((== 2) <$> sky look) (branch 0 "recovery" a >> clear) (branch 0 "task" b)
+    L.monitor l ((== 2) <$> inputBy look) (branch 0 "recovery" a >> clear) (branch 0 "task" b)
   WhileHolding look a -> observed t "whileHolding" Reactive ["the condition does not hold"] $ \branch ->
-    L.whileHolding l ((/= 3) <$> sky look) (branch 0 "branch" a)
+    L.whileHolding l ((/= 3) <$> inputBy look) (branch 0 "branch" a)
   Timeout n a -> observed t "timeout" Reactive ["TimedOut"] $ \branch ->
     L.timeout l (fromIntegral n * tick (stage t)) (branch 0 "branch" a)
  where
   l = language t
-  sky :: Look -> Signal Int
-  sky Watched = watching (readTVar (weather t))
-  sky (Polled n) = L.polling l (fromIntegral n * tick (stage t)) (atomically (readTVar (weather t)))
+  inputBy :: Look -> Signal Int
+  inputBy Watched = watching (readTVar (input t))
+  inputBy (Polled n) = L.polling l (fromIntegral n * tick (stage t)) (atomically (readTVar (input t)))
   -- A recovery that did not remove its own cause would run for ever.
-  clear = atomically (modifyTVar' (weather t) (\w -> if w == 2 then 1 else w))
+  clear = atomically (modifyTVar' (input t) (\w -> if w == 2 then 1 else w))
   valueOf = \case
     Leaf act -> Just (number act)
     _ -> Nothing

@@ -36,7 +36,7 @@ import Data.Traversable (for)
 
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime
-import Behavior.Internal.Scope (StoppedWithFault (..))
+import Behavior.Internal.Failure (StoppedWithFault (..))
 
 -- | What can be wrong with an operator.
 data Flaw

@@ -19,9 +19,9 @@ import Data.Traversable (for)
 
 import Behavior (Behavior, failWith)
 import Behavior.Internal.Failure (isCancellation, isFailure, trySynchronous)
+import Behavior.Internal.Reactive.Timeout (TimedOut (..))
 import Behavior.Internal.Runtime
-import Behavior.Internal.Source
-import Behavior.Internal.Time (TimedOut (..))
+import Behavior.Internal.Signal.Source
 import Promises.CopiedScope
 import Promises.Language hiding (sound)
 import qualified Promises.Language as Sound
@@ -52,7 +52,7 @@ copied flaw =
   numbers = map show [1 :: Int ..]
   believed (Signal opening)
     | flaw == Just TakesDeadForFalse =
-        Signal (fmap (\source -> source {view = looking (`catchSTM` \(_ :: SomeException) -> pure False) <$> view source}) . opening)
+        Signal (fmap (\source -> source {view = mapView (`catchSTM` \(_ :: SomeException) -> pure False) <$> view source}) . opening)
     | otherwise = Signal opening
 
 -- * Side by side
@@ -101,14 +101,14 @@ data Reaction a = Run String (Behavior a) | RunToEnd String (Behavior ()) | Conc
 
 react :: forall k a. Eq k => Maybe Flaw -> String -> Signal k -> (k -> Reaction a) -> Behavior a
 react flaw operator signal reaction = structured flaw operator $ \scope -> do
-  source <- open signal anything
+  source <- open signal everyValue
   let begin how = do
-        (runs, seen) <- atomically ((,) <$> traverse prepared (workers source) <*> view source)
+        (runs, seen) <- atomically ((,) <$> traverse prepare (workers source) <*> view source)
         sensors <- for (zip (workers source) runs) (\(w, run) -> worker scope (workerName w) run)
         choose sensors seen how
 
-      choose :: [Branch ()] -> View k -> Look -> IO (IO a)
-      choose sensors seen how = observe (lookAt how seen) >>= either (pure . throwIO) (obey sensors seen)
+      choose :: [Branch ()] -> View k -> ReadMode -> IO (IO a)
+      choose sensors seen how = observe (readView how seen) >>= either (pure . throwIO) (obey sensors seen)
 
       obey sensors seen old = case reaction old of
         Conclude verdict -> pure verdict
@@ -187,7 +187,7 @@ timeoutWith flaw seconds act
   | otherwise = do
       over <- newTVarIO False
       let clock = sleep seconds >> atomically (writeTVar over True)
-          elapsed = Signal (\_ -> pure (viewing (pure (always (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
+          elapsed = Signal (\_ -> pure (fromView (pure (constantView (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
       react flaw "timeout" elapsed (\up -> if up then Conclude (throwIO (TimedOut seconds)) else Run "branch" act)
 
 -- * Sensors
@@ -209,13 +209,13 @@ pollingWith flaw every act = Signal $ \_ -> do
         if stopping
           then either throwIO (const (throwIO ThreadKilled)) read'
           else atomically (writeTVar newest (Just (k, read')))
-      prepare = do
+      prepareReadings = do
         unless (flaw /= Just ForgetsThePeriod) (writeTVar nextSlot Nothing)
         pure (\asked -> readings asked `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
       seen = do
         before <- readTVar started
-        pure . always $
+        pure . constantView $
           readTVar newest >>= \case
             Just (k, read') | k > before -> either throwSTM pure read'
             _ -> retry
-  pure (viewing seen) {workers = [Worker "polling" prepare]}
+  pure (fromView seen) {workers = [Worker "polling" prepareReadings]}

@@ -16,8 +16,8 @@ import Control.Monad (void, when)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Seam (simulator, withBackend)
-import Behavior.Internal.Simulator
+import Behavior.Internal.Runtime.Backend
+import Behavior.Internal.Runtime.Dispatch (simulator, withBackend)
 
 -- | Runs a behaviour by the wrong rule, if it runs in a simulation.
 late :: IO a -> IO a

@@ -48,7 +48,7 @@ pending = pendingAll ["a"]
 pendingAll :: Show a => [String] -> (IO () -> (String -> IO ()) -> IO a) -> IO String
 pendingAll names target = do
   gate <- newGate
-  book <- newNotebook
+  book <- newLog
   t <- thread "target" (framed (target (uninterruptibleMask_ (pass gate)) (note book)))
   throwers <- traverse (throwsTo t) names
   open gate
@@ -65,7 +65,7 @@ framed act = act `catch` \e -> throwIO (e :: SomeException)
 -- | This is thrown to the target once it is blocked.
 thrownTo :: Show a => ((String -> IO ()) -> IO a) -> IO String
 thrownTo target = do
-  book <- newNotebook
+  book <- newLog
   t <- thread "target" (target (note book))
   w <- throwsTo t "a"
   end <- endOf t
@@ -110,7 +110,7 @@ targets =
   , Fixed "that ends masked by an exception of its own never receives it" "1 threw b" $
       pending (\waits say -> uninterruptibleMask_ (waits >> say "1" >> throwIO (Cancel "b") :: IO ()))
   , Fixed "has these masking states" states $ mask_ $ do
-      book <- newNotebook
+      book <- newLog
       let say = getMaskingState >>= note book . take 9 . show
       t <- thread "target" $ do
         say
@@ -195,7 +195,7 @@ several =
       pendingAll ["a", "b"] (\waits say -> waits `onException` say "1")
   , Fixed "one that was withdrawn is not raised" "c a ()" $ do
       gate <- newGate
-      book <- newNotebook
+      book <- newLog
       t <- thread "target" $
         (uninterruptibleMask_ (pass gate) `catch` recording (note book)) `catch` recording (note book)
       a <- throwsTo t "a"
@@ -237,7 +237,7 @@ handlers =
       endOf t <* endOf a <* endOf b
   , Fixed "a cleanup that need not wait is not" "1 2 threw a" $ do
       gate <- newGate
-      book <- newNotebook
+      book <- newLog
       t <- thread "target" (hang `finally` (note book "1" >> uninterruptibleMask_ (pass gate) >> note book "2") :: IO ())
       a <- throwsTo t "a"
       b <- throwsTo t "b"
@@ -328,7 +328,7 @@ itself =
  where
   self name = myThreadId >>= \me -> interrupt me (Cancel name)
   alone act = do
-    book <- newNotebook
+    book <- newLog
     t <- thread "target" (act (note book))
     end <- endOf t
     (\recorded -> unwords (recorded ++ [end])) <$> notes book
@@ -346,7 +346,7 @@ operators =
   , Fixed "parallel stops the loser at its unmask" "()" $ do
       first <- newGate
       gate <- newGate
-      book <- newNotebook
+      book <- newLog
       inside <- newGate
       t <- thread "operator" (parallel (pass first) (masked inside gate >> note book "goes on"))
       pass inside
@@ -367,7 +367,7 @@ operators =
       open gate
       endOf t <* endOf a
   , Fixed "runs its branches unmasked" "Unmasked Unmasked ()" $ do
-      book <- newNotebook
+      book <- newLog
       let say = getMaskingState >>= note book . show
       t <- thread "operator" (uninterruptibleMask_ (both say say))
       end <- endOf t

@@ -33,7 +33,7 @@ import qualified Data.Set as Set
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 
 import Behavior.Internal.Runtime
-import Behavior.Internal.Seam (inSimulation)
+import Behavior.Internal.Runtime.Dispatch (inSimulation)
 import Behavior.Sim
 import Support
 

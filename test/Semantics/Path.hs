@@ -47,7 +47,7 @@ data Verdict
   = Possible
   | -- | The timeline is none of the relation from the given event on; this is what was
     -- possible instead.
-    Impossible Timeline [(Ticks, Event)]
+    Impossible Timeline [(Ticks, Transition)]
   | -- | No path ends so.
     ImpossibleEnd [End]
   | -- | There were more states to look at than fuel.
@@ -56,7 +56,7 @@ data Verdict
 
 -- | Whether a run of the world may have been seen so. It is said which events can be seen
 -- at all.
-explains :: Int -> (Event -> Bool) -> World -> Seen -> Verdict
+explains :: Int -> (Transition -> Bool) -> World -> Seen -> Verdict
 explains fuel visible world seen = go (Set.singleton (initial world)) (filter (visible . snd) (timeline seen))
  where
   go states = \case
@@ -83,7 +83,7 @@ explains fuel visible world seen = go (Set.singleton (initial world)) (filter (v
   at t = filter ((== t) . clock . now) . Set.toList
 
 -- | Every timeline that the relation allows, with its end. Nothing: more than fuel.
-paths :: Int -> (Event -> Bool) -> World -> Maybe (Set Seen)
+paths :: Int -> (Transition -> Bool) -> World -> Maybe (Set Seen)
 paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world))
  where
   slip = slippage world
@@ -102,7 +102,7 @@ paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world)
       (Map.toList next)
 
 -- | All states that are reached without anything to see, up to a moment.
-silently :: Int -> Ticks -> (Event -> Bool) -> Maybe Ticks -> Set State -> Maybe (Set State)
+silently :: Int -> Ticks -> (Transition -> Bool) -> Maybe Ticks -> Set State -> Maybe (Set State)
 silently fuel slip visible limit states = go states (Set.toList states)
  where
   go known = \case
@@ -131,7 +131,7 @@ goesOnAt t s = case running s of
   _ -> null (step s) && all ((> t) . clock . now) (pass 0 s)
 
 -- | Whether an event can be seen.
-everything, whatIsDone :: Event -> Bool
+everything, whatIsDone :: Transition -> Bool
 everything = (/= Silent)
 whatIsDone = \case
   Silent -> False

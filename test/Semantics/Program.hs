@@ -31,7 +31,7 @@ module Semantics.Program
     -- * What comes of them
   , Result (..)
   , Value (..)
-  , Event (..)
+  , Transition (..)
   , Deed (..)
   , Timeline
   , number
@@ -203,7 +203,7 @@ data Value
   deriving (Eq, Ord, Show)
 
 -- | What happens in a step.
-data Event
+data Transition
   = -- | Nothing that anybody can see.
     Silent
   | Name `Does` Deed
@@ -223,7 +223,7 @@ data Deed
   deriving (Eq, Ord, Show)
 
 -- | What could be seen, and when.
-type Timeline = [(Ticks, Event)]
+type Timeline = [(Ticks, Transition)]
 
 -- | A result as a number, for those who read signals.
 number :: Value -> Int

@@ -32,16 +32,16 @@ import Data.Set (Set)
 import qualified Data.Set as Set
 
 import Behavior.Internal.Failure hiding (Failed (..))
-import Behavior.Internal.Filter
 import Behavior.Internal.Nursery
 import Behavior.Internal.Parallel (allOf, both, firstOf, parallel)
-import Behavior.Internal.Reactive
+import Behavior.Internal.Reactive.Operators
+import Behavior.Internal.Reactive.Timeout
 import Behavior.Internal.Runtime hiding (Event (..), Label)
-import Behavior.Internal.Sensor
-import Behavior.Internal.Scope (StoppedWithFault (..))
-import Behavior.Internal.Source (watching, withShared)
-import qualified Behavior.Internal.Source as Library
-import Behavior.Internal.Time
+import Behavior.Internal.Signal.Filter
+import Behavior.Internal.Signal.Polling
+import Behavior.Internal.Signal.Shared (withShared)
+import Behavior.Internal.Signal.Source (watching)
+import qualified Behavior.Internal.Signal.Source as Library
 import Behavior.Sim
   ( StepKind (Note)
   , Label (..)
@@ -126,7 +126,7 @@ data Stage = Stage
 
 -- | The world's program and environment. What can be seen is told to the given
 -- action, which must not be a scheduling point.
-behavior :: (Event -> IO ()) -> World -> Behavior Value
+behavior :: (Transition -> IO ()) -> World -> Behavior Value
 behavior tell world = do
   stage <- Stage <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure noNursery <*> pure (pure 0)
   let played = play tell stage (program world)
@@ -151,7 +151,7 @@ behavior tell world = do
     sleepUntil (fromIntegral (patience world))
   noNursery _ = throwIO (ErrorCall "a fork outside every scope")
 
-play :: (Event -> IO ()) -> Stage -> Program -> Behavior Value
+play :: (Transition -> IO ()) -> Stage -> Program -> Behavior Value
 play tell stage = go
  where
   go :: Program -> Behavior Value

@@ -22,7 +22,7 @@ import Semantics.State
 
 -- | A step of a part of the program may also be one that is its surroundings' business.
 data Action
-  = Happens Event
+  = Happens Transition
   | -- | Perhaps an answer is wanted, by that number.
     Forks (Maybe Int) Program
   | -- | It fails to fork, which is so only while its nursery is ending.
@@ -43,7 +43,7 @@ oneOf one = \case
 -- takes its steps, and how it hears a request to stop.)
 sourceSteps
   :: (Now -> Running -> Steps Running)
-  -> (Now -> Running -> [(Event, Running)])
+  -> (Now -> Running -> [(Transition, Running)])
   -> Now
   -> Source
   -> Steps Source
@@ -60,7 +60,7 @@ sourceSteps steps hear = go
 
 pollerSteps
   :: (Now -> Running -> Steps Running)
-  -> (Now -> Running -> [(Event, Running)])
+  -> (Now -> Running -> [(Transition, Running)])
   -> Now
   -> Poller
   -> Steps Poller

@@ -27,7 +27,7 @@ import Semantics.State
 import Semantics.Verdict
 
 -- | What may happen next.
-step :: State -> [(Event, State)]
+step :: State -> [(Transition, State)]
 step (State t r) = [(event, State t' r') | (Happens event, t', r') <- steps t r]
 
 -- | Time passes, up to the next moment at which something can happen; or to a later one, as
@@ -205,7 +205,7 @@ running' t asks r
   born = if asks == Unborn then Unasked else asks
 
 -- | What may become of it if it hears the request now. None: it cannot.
-hear :: Now -> Running -> [(Event, Running)]
+hear :: Now -> Running -> [(Transition, Running)]
 hear t = \case
   Starting _ -> stopped
   Opening _ -> stopped

@@ -60,7 +60,7 @@ calls = do
     look <- action mock "look" [returning 'a', fails "dark", faults "bug", returning 'b']
     ends <- replicateM 5 (ending look)
     ends `shouldBe` [Gave 'a', FailedWith "FailedBecause \"dark\"", FaultedWith "bug", Gave 'b', Gave 'b']
-    map happening . entries <$> happened mock
+    map entryKind . entries <$> happened mock
       `shouldReturn` concatMap (\end -> [Begins, end]) [Succeeds, Fails "dark", Faults "bug", Succeeds, Succeeds]
     map call . entries <$> happened mock `shouldReturn` [1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
 
@@ -69,7 +69,7 @@ calls = do
     ticket <- action mock "ticket" (map returning [1 :: Int ..])
     tickets <- mapConcurrently (const (replicateM 50 ticket)) "12345678"
     sort (concat tickets) `shouldBe` [1 .. 400]
-    sort . map call . filter ((== Succeeds) . happening) . entries <$> happened mock `shouldReturn` [1 .. 400]
+    sort . map call . filter ((== Succeeds) . entryKind) . entries <$> happened mock `shouldReturn` [1 .. 400]
     count' <- sensor mock "count" (map returning [1 :: Int ..])
     counts <- mapConcurrently (const (replicateM 50 count')) "12345678"
     sort (concat counts) `shouldBe` [1 .. 400]
@@ -133,27 +133,27 @@ stopped = do
         mock <- newMock
         act <- action mock "act" [script]
         end <- run (timeout 1 act)
-        (,) end . map (\e -> (happenedAt e, happening e)) . entries <$> happened mock
+        (,) end . map (\e -> (entryTime e, entryKind e)) . entries <$> happened mock
 
   it "stops at once" $
     stopping (succeeds `taking` 9)
-      `shouldReturn` (("failed TimedOut 1.0", 1), [(0, Begins), (1, AskedToStop), (1, Stops)])
+      `shouldReturn` (("failed TimedOut 1.0", 1), [(0, Begins), (1, StopRequested), (1, Stops)])
 
   it "stops when its cleanup is over" $
     stopping (succeeds `taking` 9 `slowToStop` 2 `slowToStop` 0.5)
-      `shouldReturn` (("failed TimedOut 1.0", 3.5), [(0, Begins), (1, AskedToStop), (3.5, Stops)])
+      `shouldReturn` (("failed TimedOut 1.0", 3.5), [(0, Begins), (1, StopRequested), (3.5, Stops)])
 
   it "may fail there" $
     stopping (succeeds `taking` 9 `failsStopping` "stuck" `slowToStop` 1)
-      `shouldReturn` (("failed FailedBecause \"stuck\"", 2), [(0, Begins), (1, AskedToStop), (2, Fails "stuck")])
+      `shouldReturn` (("failed FailedBecause \"stuck\"", 2), [(0, Begins), (1, StopRequested), (2, Fails "stuck")])
 
   it "may fault there" $
     stopping (succeeds `taking` 9 `slowToStop` 1 `faultsStopping` "bug")
-      `shouldReturn` (("faulted bug", 2), [(0, Begins), (1, AskedToStop), (2, Faults "bug")])
+      `shouldReturn` (("faulted bug", 2), [(0, Begins), (1, StopRequested), (2, Faults "bug")])
 
   it "may complete anyway, as late as it would have been" $
     stopping (completesAnyway (returning 'x' `taking` 9))
-      `shouldReturn` (("returned 'x'", 9), [(0, Begins), (1, AskedToStop), (9, Succeeds)])
+      `shouldReturn` (("returned 'x'", 9), [(0, Begins), (1, StopRequested), (9, Succeeds)])
 
   it "cannot be interrupted once more" $
     for_ [(hangs `slowToStop` 5, 6, Stops), (completesAnyway (succeeds `taking` 9), 9, Succeeds)] $ \(script, t, end) -> do
@@ -163,8 +163,8 @@ stopped = do
         thread <- mask_ (start (Label "test" "act") act)
         replicateM_ 3 $ sleep 1 >> throwToAll (const (Cancel "again")) [threadId thread]
         atomically (threadEnd thread)
-      map (\e -> (happenedAt e, happening e)) . entries <$> happened mock
-        `shouldReturn` [(0, Begins), (1, AskedToStop), (t, end)]
+      map (\e -> (entryTime e, entryKind e)) . entries <$> happened mock
+        `shouldReturn` [(0, Begins), (1, StopRequested), (t, end)]
 
   it "has not begun when it was asked before" $ do
     mock <- newMock
@@ -278,7 +278,7 @@ watched = do
       `shouldReturn` [ " 0.0 s  low: is False"
                      , " 0.0 s  tidy: begins"
                      , " 5.0 s  low: becomes True"
-                     , " 5.0 s  tidy: is asked to stop"
+                     , " 5.0 s  tidy: stop requested"
                      , " 6.0 s  tidy: has stopped"
                      , " 6.0 s  recharge: begins"
                      , " 8.0 s  low: becomes False"
@@ -344,14 +344,14 @@ worlds = do
   it "has a clock that starts with the first that happens" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
-    _ <- simulate (sleep 5 >> act >> sleep 1 >> remark mock "over")
-    map happenedAt . entries <$> happened mock `shouldReturn` [0, 0, 1]
+    _ <- simulate (sleep 5 >> act >> sleep 1 >> note mock "over")
+    map entryTime . entries <$> happened mock `shouldReturn` [0, 0, 1]
 
   it "has one that can be started before" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate (begin mock >> sleep 5 >> begin mock >> act)
-    map happenedAt . entries <$> happened mock `shouldReturn` [5, 5]
+    map entryTime . entries <$> happened mock `shouldReturn` [5, 5]
 
   it "works on real threads" $ do
     mock <- newMock
@@ -362,7 +362,7 @@ worlds = do
     over <- now
     over - begun `shouldSatisfy` (>= 0.002)
     mock `shouldRecord` becoming "low" True `comesBefore` successOf "act"
-    map happenedAt . filter ((== "low") . subject) . entries <$> happened mock `shouldReturn` [0, 0.001]
+    map entryTime . filter ((== "low") . subject) . entries <$> happened mock `shouldReturn` [0, 0.001]
 
   it "says why a claim does not hold" $ do
     mock <- newMock

@@ -37,14 +37,14 @@ day =
     [ line 0 "low" (Is "False")
     , line 1 "drive" Begins
     , line 4 "low" (Becomes "True")
-    , line 4 "drive" AskedToStop
+    , line 4 "drive" StopRequested
     , line 5 "drive" Stops
     , line 5 "charge" Begins
     , line 9 "low" (Becomes "False")
     , line 9 "charge" Succeeds
     , RecordEntry 9 "drive" "" 2 Begins
     , RecordEntry 12 "drive" "" 2 (Fails "stuck")
-    , line 12 "help!" Remarked
+    , line 12 "help!" Noted
     ]
 
 -- | Each of these holds, or does not.
@@ -59,7 +59,7 @@ reads' = do
       `shouldBe` [ " 0.0 s  low: is False"
                  , " 1.0 s  drive: begins"
                  , " 4.0 s  low: becomes True"
-                 , " 4.0 s  drive: is asked to stop"
+                 , " 4.0 s  drive: stop requested"
                  , " 5.0 s  drive: has stopped"
                  , " 5.0 s  charge: begins"
                  , " 9.0 s  low: becomes False"
@@ -75,10 +75,10 @@ reads' = do
 existence :: Spec
 existence = do
   it "holds of what is on record" $
-    hold [eventually (startOf "charge"), eventually (remarked "help!"), eventually (failureOf "drive")]
+    hold [eventually (startOf "charge"), eventually (noted "help!"), eventually (failureOf "drive")]
 
   it "does not hold of what is not" $
-    doNotHold [eventually (startOf "sing"), eventually (faultOf "drive"), eventually (remarked "help")]
+    doNotHold [eventually (startOf "sing"), eventually (faultOf "drive"), eventually (noted "help")]
 
   it "with a limit holds up to the limit, itself included" $ do
     hold [withinSeconds 5 (startOf "charge"), withinSeconds 12 (failureOf "drive")]
@@ -167,7 +167,7 @@ refutation = do
             , "     0.0 s  low: is False"
             , "     1.0 s  drive: begins"
             , "  >  4.0 s  low: becomes True"
-            , "     4.0 s  drive: is asked to stop"
+            , "     4.0 s  drive: stop requested"
             , "     5.0 s  drive: has stopped"
             , "  >  5.0 s  charge: begins"
             , "     9.0 s  low: becomes False"
@@ -234,5 +234,5 @@ whiles = do
     count (interruptionOf "drive" `during` running "drive") day `shouldBe` 1
 
   it "end when the value is lost" $ do
-    let rows = [line 0 "x" (Becomes "1"), line 1 "x" LosesItsValue, line 2 "a" Begins]
+    let rows = [line 0 "x" (Becomes "1"), line 1 "x" LosesValue, line 2 "a" Begins]
     count (startOf "a" `during` being "x" (1 :: Int)) (Record ["x", "a"] rows) `shouldBe` 0

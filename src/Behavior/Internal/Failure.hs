@@ -48,12 +48,17 @@ module Behavior.Internal.Failure
     -- * What to do about a fault
   , tryAny
   , catchAny
+
+    -- * Faults while stopping
+  , StoppedWithFault (..)
   ) where
 
 import Control.Exception
   ( Exception (..)
   , SomeAsyncException
   , SomeException (..)
+  , asyncExceptionFromException
+  , asyncExceptionToException
   , catch
   , throwIO
   , try
@@ -344,3 +349,33 @@ tryAny = trySynchronous
 -- @since 0.1.0.0
 catchAny :: Behavior a -> (SomeException -> Behavior a) -> Behavior a
 catchAny act handler = tryAny act >>= either handler pure
+
+-- | What is thrown when a behaviour was cancelled and a cleanup faulted on the way
+-- out: the cancellation and the fault, as one asynchronous exception, so that no
+-- handler for ordinary exceptions takes it for the end of the matter.
+--
+-- An operator that asked for the stop takes the fault out and throws it, as the
+-- fault that it is. You meet the pair itself where a cancellation came from
+-- outside this library, from 'System.Timeout.timeout' say.
+--
+-- @since 0.1.0.0
+data StoppedWithFault = StoppedWithFault
+  { stoppedBy :: !SomeException
+  -- ^ The cancellation.
+  , stoppedFault :: !SomeException
+  -- ^ The leftmost fault of the behaviours that it stopped.
+  }
+
+instance Show StoppedWithFault where
+  showsPrec precedence (StoppedWithFault cause fault) =
+    showParen (precedence > 10) $
+      showString "StoppedWithFault "
+        . showsPrec 11 cause
+        . showString " "
+        . showsPrec 11 fault
+
+instance Exception StoppedWithFault where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException
+  displayException (StoppedWithFault (SomeException cause) (SomeException fault)) =
+    "stopped by " ++ displayException cause ++ ", and while stopping: " ++ displayException fault

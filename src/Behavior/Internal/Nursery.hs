@@ -26,7 +26,7 @@ import Control.Monad (filterM, foldM, (>=>))
 import Data.Foldable (asum, traverse_)
 
 import Behavior.Internal.Failure
-import Behavior.Internal.Parallel (tell, told)
+import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (Label (..), atomically)
 import Behavior.Internal.Scope hiding (requestStop)
 
@@ -95,34 +95,34 @@ instance Exception ChildStopped where
 scoped :: (Nursery -> Behavior a) -> Behavior a
 scoped body = do
   stage <- newTVarIO (Open [])
-  structured (\scope -> serving stage scope (body (Nursery stage)) `finally` atomically (writeTVar stage Ending))
+  structured (\scope -> serveRequests stage scope (body (Nursery stage)) `finally` atomically (writeTVar stage Ending))
     `finally` atomically (writeTVar stage Closed)
 
 -- | Starts and stops children as it is requested, until there is a verdict.
-serving :: TVar Stage -> Scope -> Behavior a -> IO (IO a)
-serving stage scope body = do
-  trouble <- newTVarIO Nothing
+serveRequests :: TVar Stage -> Scope -> Behavior a -> IO (IO a)
+serveRequests stage scope body = do
+  failure <- newLeftmost
   main <- branch scope (Label "scoped" "body") body
   let -- How many were forked; those that may live yet; and the number at which to look for
       -- those that do not.
       serve count children sweepAt = do
-        next <- atomically (asum [Left . outcomeToIO <$> outcome main, Left . throwIO <$> told trouble, Right <$> requested])
+        next <- atomically (asum [Left . outcomeToIO <$> outcome main, Left . throwIO <$> readLeftmost failure, Right <$> requested])
         case next of
           Left verdict -> pure verdict
           Right new -> do
-            (count', children') <- foldM doing (count, children) new
+            (count', children') <- foldM handleRequest (count, children) new
             if count' < sweepAt
               then serve count' children' sweepAt
               else do
-                living <- filterM mayLive children'
-                serve count' living (count' + max 16 (length living))
-      doing (count, children) = \case
+                running <- filterM mayRun children'
+                serve count' running (count' + max 16 (length running))
+      handleRequest (count, children) = \case
         Stop child -> (count, children) <$ requestStopAsync [child]
         Fork act accepted -> do
           let n = count + 1 :: Int
           -- Masked: what was started is also handed over.
           child <- mask_ $ do
-            new <- branchWithHook (traverse_ (tell trouble n) . troubleOf) scope (Label "scoped" "fork") act
+            new <- branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act
             new <$ atomically (putTMVar accepted new)
           pure (n, SomeBranch child : children)
       requested =
@@ -130,15 +130,15 @@ serving stage scope body = do
           Open new@(_ : _) -> reverse new <$ writeTVar stage (Open [])
           _ -> retry
       -- Of those that have ended without trouble nothing is kept.
-      mayLive (SomeBranch child) =
-        tryReadOutcome child >>= \end -> case troubleOf <$> end of
+      mayRun (SomeBranch child) =
+        tryReadOutcome child >>= \end -> case thrownBy <$> end of
           Just Nothing -> False <$ forget scope child
           _ -> pure True
   serve 0 [] 16
 
 -- | What a child has thrown, unless it was stopped.
-troubleOf :: Outcome a -> Maybe SomeException
-troubleOf = \case
+thrownBy :: Outcome a -> Maybe SomeException
+thrownBy = \case
   Completed _ -> Nothing
   Stopped _ -> Nothing
   Failing e -> Just e
@@ -160,15 +160,15 @@ fork (Nursery stage) act = do
   atomically $
     readTVar stage >>= \case
       Open waiting -> writeTVar stage (Open (Fork act accepted : waiting))
-      Ending -> tooLate
+      Ending -> failEnding
       Closed -> throwSTM (ErrorCall "fork: the nursery's scoped behaviour has ended")
   Child stage <$> atomically (takeTMVar accepted `orElse` unlessOpen)
  where
   unlessOpen =
     readTVar stage >>= \case
       Open _ -> retry
-      _ -> tooLate
-  tooLate = failWith "fork: the nursery's scoped behaviour is ending"
+      _ -> failEnding
+  failEnding = failWith "fork: the nursery's scoped behaviour is ending"
 
 -- | The result of a child; retries until the child has ended, cleanup included.
 --

@@ -14,20 +14,16 @@ module Behavior.Internal.Parallel
     -- * Any number
   , firstOf
   , allOf
-
-    -- * Who tells leftmost counts
-  , Told
-  , tell
-  , told
   ) where
 
-import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (SomeException, throwIO)
+import Control.Concurrent.STM (retry)
+import Control.Exception (throwIO)
 import Control.Monad (foldM, void, (<=<), (<$!>))
 import Data.Foldable (toList)
 import Data.Traversable (mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, failed)
+import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 
@@ -96,9 +92,9 @@ both left right = structured $ \scope -> do
   l <- branch scope (Label "both" "left") (void left)
   r <- branch scope (Label "both" "right") (void right)
   let -- The left one first: when that has ended, it has also when the other is looked at.
-      atAGlance = tryReadOutcome l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$!> tryReadOutcome r)
-      atOnce = verdict <$> tryReadOutcomeSTM l <*> tryReadOutcomeSTM r
-  tryReadThenBlock atAGlance (atomically (atOnce >>= maybe retry pure))
+      tryReadBoth = tryReadOutcome l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$!> tryReadOutcome r)
+      readBoth = verdict <$> tryReadOutcomeSTM l <*> tryReadOutcomeSTM r
+  tryReadThenBlock tryReadBoth (atomically (readBoth >>= maybe retry pure))
  where
   verdict l r = case (result <$> l, result <$> r) of
     (Just (Left e), _) -> Just (throwIO e)
@@ -124,9 +120,9 @@ both left right = structured $ \scope -> do
 firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
 firstOf behaviors = structured $ \scope -> do
-  first <- newTVarIO Nothing
-  void $ startAll (\n -> branchWithHook (tell first n) scope (Label "firstOf" (show n))) behaviors
-  outcomeToIO <$> tryReadThenBlock (toldNow first) (atomically (told first))
+  first <- newLeftmost
+  void $ startAll (\n -> branchWithHook (publish first n) scope (Label "firstOf" (show n))) behaviors
+  outcomeToIO <$> tryReadThenBlock (tryReadLeftmost first) (atomically (readLeftmost first))
 
 -- | Starts all at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
@@ -142,17 +138,18 @@ firstOf behaviors = structured $ \scope -> do
 -- @since 0.1.0.0
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
 allOf behaviors = structured $ \scope -> do
-  trouble <- newTVarIO Nothing
-  branches <- startAll (\n -> branchWithHook (tellTrouble trouble n) scope (Label "allOf" (show n))) (toList behaviors)
-  let waiting [] = pure (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches)
-      waiting (b : bs) = do
-        wrong <-
+  failure <- newLeftmost
+  branches <- startAll (\n -> branchWithHook (publishFailure failure n) scope (Label "allOf" (show n))) (toList behaviors)
+  let awaitAll [] = pure (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches)
+      awaitAll (b : bs) = do
+        failing <-
           tryReadThenBlock ((Nothing <$) <$> completedNow b) . atomically $
             tryReadOutcomeSTM b >>= \case
               Just (Completed _) -> pure Nothing
-              _ -> Just <$> told trouble
-        maybe (waiting bs) (pure . throwIO) wrong
-  waiting branches
+              _ -> Just <$> readLeftmost failure
+        maybe (awaitAll bs) (pure . throwIO) failing
+  awaitAll branches
+
 -- | The container, with these (as many) for its elements.
 refilled :: Traversable t => t x -> [a] -> t a
 refilled container = snd . flip (mapAccumL next) container
@@ -165,29 +162,6 @@ refilled container = snd . flip (mapAccumL next) container
 -- In constant stack: after each start GHC may turn to another thread, and before that it
 -- walks through all of this one's stack.
 startAll :: (Int -> Behavior a -> IO (Branch a)) -> [Behavior a] -> IO [Branch a]
-startAll starting = fmap reverse . foldM next [] . zip [1 ..]
+startAll startOne = fmap reverse . foldM next [] . zip [1 ..]
  where
-  next started (n, act) = (: started) <$> starting n act
-
--- | Where branches tell something, each with its place, and the leftmost counts. To wait
--- for the first of n is so to look at one variable, and not at n.
-type Told x = TVar (Maybe (Int, x))
-
--- | Tells, unless one further left has told.
-tell :: Told x -> Int -> x -> STM ()
-tell leftmost n x =
-  readTVar leftmost >>= \case
-    Just (m, _) | m < n -> pure ()
-    _ -> writeTVar leftmost (Just (n, x))
-
--- | Tells what a branch threw, if it did.
-tellTrouble :: Told SomeException -> Int -> Outcome a -> STM ()
-tellTrouble trouble n = either (tell trouble n) (\_ -> pure ()) . result
-
--- | What was told; retries until something was.
-told :: Told x -> STM x
-told leftmost = readTVar leftmost >>= maybe retry (pure . snd)
-
--- | The same, at a glance.
-toldNow :: Told x -> IO (Maybe x)
-toldNow leftmost = fmap snd <$> readTVarIO leftmost
+  next started (n, act) = (: started) <$> startOne n act

@@ -6,11 +6,11 @@
 -- |
 -- The seam: all that the library does with threads, time and waiting goes through
 -- this module. No other module (but the clock that it sleeps by,
--- "Behavior.Internal.Alarm") forks, delays, throws to a thread or waits in a
+-- "Behavior.Internal.Runtime.TimerWheel") forks, delays, throws to a thread or waits in a
 -- transaction, so a simulation that takes over here has taken over everything.
 --
 -- Each operation is done in reality, or in the simulation that the calling thread
--- is part of ("Behavior.Internal.Seam").
+-- is part of ("Behavior.Internal.Runtime.Dispatch").
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime
@@ -74,11 +74,11 @@ import System.IO.Unsafe (unsafePerformIO)
 import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 #endif
 
-import qualified Behavior.Internal.Alarm as Alarm
-import Behavior.Internal.Counter
-import Behavior.Internal.Seam
+import Behavior.Internal.Runtime.Backend
+import Behavior.Internal.Runtime.Counter
+import Behavior.Internal.Runtime.Dispatch
+import qualified Behavior.Internal.Runtime.TimerWheel as Alarm
 import Behavior.Internal.Seconds
-import Behavior.Internal.Simulator
 
 -- | A thread that the library has started, and what it publishes as it ends.
 data Thread r = Thread
@@ -190,16 +190,16 @@ throwToOne thread e =
 -- that are left: at most as many as there are threads to interrupt.
 throwToAll :: Exception e => (ThreadId -> e) -> [ThreadId] -> IO ()
 throwToAll what targets =
-  inSimulation byMessenger $ \simulation -> for_ targets $ \thread -> send simulation thread (toException (what thread))
+  inSimulation byHelpers $ \simulation -> for_ targets $ \thread -> send simulation thread (toException (what thread))
  where
-  byMessenger = newIORef targets >>= spawnHelper targets
+  byHelpers = newIORef targets >>= spawnHelper targets
   spawnHelper [] _ = pure ()
   spawnHelper (_ : others) left =
     readIORef left >>= \case
       [] -> pure ()
       _ -> do
-        messenger <- forkIO (uninterruptibleMask_ (drain left))
-        when labelling $ labelThread messenger (show (Label "interrupt" "messenger"))
+        helper <- forkIO (uninterruptibleMask_ (drain left))
+        when labelling $ labelThread helper (show (Label "interrupt" "messenger"))
         yield
         spawnHelper others left
   drain left =
@@ -234,16 +234,16 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
 -- What the glance gives must be what the wait would have given, at some moment meanwhile:
 -- it should look at one variable only. (In a simulation there is no glance.)
 tryReadThenBlock :: IO (Maybe a) -> IO a -> IO a
-tryReadThenBlock glance waiting = inSimulation twice (const (pure Nothing)) >>= maybe waiting pure
+tryReadThenBlock tryRead block = inSimulation tryTwice (const (pure Nothing)) >>= maybe block pure
  where
-  twice = glance >>= maybe (yield >> glance) (pure . Just)
+  tryTwice = tryRead >>= maybe (yield >> tryRead) (pure . Just)
 
 -- | A wait that nothing can interrupt. It goes on when GHC takes the thread for deadlocked: GHC
 -- does so, too, while the cleanup that the thread waits for handles the same exception.
 awaitUninterruptibly :: IO a -> IO a
-awaitUninterruptibly waiting = uninterruptibleMask_ again
+awaitUninterruptibly block = uninterruptibleMask_ again
  where
-  again = try waiting >>= either (\BlockedIndefinitelyOnSTM -> again) pure
+  again = try block >>= either (\BlockedIndefinitelyOnSTM -> again) pure
 
 -- | A moment at which the others may run, and a cancellation that is under way
 -- arrives, if the masking state allows it.
@@ -319,7 +319,7 @@ withSink sink =
 
 -- | Says something that whoever watches should know.
 annotate :: String -> IO ()
-annotate text = emit (Noted text) >> inSimulation (pure ()) (\simulation -> record simulation (Noted text))
+annotate text = emit (Annotated text) >> inSimulation (pure ()) (\simulation -> record simulation (Annotated text))
 
 -- | Whether what happens now belongs to what a run is judged by. When a simulated run has
 -- ended, what is left of it is unwound, which does not.

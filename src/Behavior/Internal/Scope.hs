@@ -42,7 +42,6 @@ module Behavior.Internal.Scope
   , completedNow
   , outcomeToIO
   , result
-  , StoppedWithFault (..)
   ) where
 
 import Control.Concurrent (ThreadId, myThreadId)
@@ -68,7 +67,7 @@ import Control.Monad (foldM, when)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
-import Behavior.Internal.Failure (BehaviorFailed (..), isFailure)
+import Behavior.Internal.Failure (BehaviorFailed (..), StoppedWithFault (..), isFailure)
 import Behavior.Internal.Runtime
 
 -- | The branches that an operator has started, newest first. Only the operator's
@@ -78,7 +77,7 @@ newtype Scope = Scope (IORef [SomeBranch])
 -- | A behaviour that runs in a thread of its own on behalf of an operator.
 data Branch a = Branch
   { branchThread :: {-# UNPACK #-} !(Thread (Outcome a))
-  , branchAsked :: {-# UNPACK #-} !(IORef Bool)
+  , stopRequested :: {-# UNPACK #-} !(IORef Bool)
   -- ^ Whether it was asked to stop: nobody is asked twice, for the second
   -- request would interrupt the cleanup that the first one began.
   }
@@ -118,7 +117,7 @@ structured body = do
     scope <- Scope <$> newIORef []
     -- (As @body scope@ it would be a thunk first, in every operator.)
     verdict <- try (restore (pure scope >>= body))
-    (thrown, faults) <- end scope state (either Just (const Nothing) verdict)
+    (thrown, faults) <- stopAll scope state (either Just (const Nothing) verdict)
     deadlocked <- maybe (pure False) isDeadlock thrown
     case (thrown, faults) of
       (Just e, []) | not deadlocked -> throwIO e
@@ -148,27 +147,27 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 -- thrown then stays pending, in GHC's own queue, from which it can be withdrawn. (To receive
 -- it here and throw it again later would let a time limit reach what comes after its end.)
 -- Neither can a caller that is masked: it must not lose the verdict.
-end :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
-end (Scope branches) state before = do
+stopAll :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
+stopAll (Scope branches) state before = do
   newestFirst <- readIORef branches
-  (thrown, ()) <- patiently before (requestStop newestFirst)
+  (thrown, ()) <- interruptibleOnce before (requestStop newestFirst)
   fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
  where
   withFault (thrown, faults) (SomeBranch b) = do
-    (thrown', o) <- tryReadThenBlock (fmap ((,) thrown) <$> tryReadOutcome b) (patiently thrown (atomically (outcome b)))
+    (thrown', o) <- tryReadThenBlock (fmap ((,) thrown) <$> tryReadOutcome b) (interruptibleOnce thrown (atomically (outcome b)))
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)
   -- Waits so that it can be interrupted; then so that it cannot.
-  patiently thrown waiting = case thrown of
+  interruptibleOnce thrown wait = case thrown of
     Nothing | state == Unmasked -> do
-      waited <- try waiting
+      waited <- try wait
       case waited of
         Right a -> pure (Nothing, a)
         Left e -> do
           deadlocked <- isDeadlock e
-          (,) (if deadlocked then Nothing else Just e) <$> awaitUninterruptibly waiting
-    _ -> (,) thrown <$> awaitUninterruptibly waiting
+          (,) (if deadlocked then Nothing else Just e) <$> awaitUninterruptibly wait
+    _ -> (,) thrown <$> awaitUninterruptibly wait
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
@@ -176,18 +175,18 @@ branch = branchWithHook (\_ -> pure ())
 
 -- | The same; in the transaction that publishes how the branch ended, the given is done too.
 branchWithHook :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
-branchWithHook hook scope label act = launch scope (\_ -> startWith classified hook label act)
+branchWithHook hook scope label act = launch scope (\_ -> startWith classify hook label act)
 
 -- | Starts a branch that can see whether it was asked to stop. One that runs a
 -- user's action in a loop must look: the action may have swallowed the request.
 worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-worker scope label act = launch scope (startWith classified (\_ -> pure ()) label . act)
+worker scope label act = launch scope (startWith classify (\_ -> pure ()) label . act)
 
 launch :: Scope -> (IO Bool -> IO (Thread (Outcome a))) -> IO (Branch a)
-launch (Scope branches) starting = mask_ $ do
-  asked <- newIORef False
-  thread <- starting (readIORef asked)
-  let new = Branch {branchThread = thread, branchAsked = asked}
+launch (Scope branches) startThread = mask_ $ do
+  requested <- newIORef False
+  thread <- startThread (readIORef requested)
+  let new = Branch {branchThread = thread, stopRequested = requested}
   modifyIORef' branches (SomeBranch new :)
   pure new
 
@@ -218,9 +217,9 @@ requestStop branches = mask_ $
 
 -- | Those that are still to be asked, which from now on count as asked.
 claimStopRequests :: [SomeBranch] -> IO [ThreadId]
-claimStopRequests = foldM asked []
+claimStopRequests = foldM requested []
  where
-  asked threads (SomeBranch b) = do
+  requested threads (SomeBranch b) = do
     needed <- claimStopRequest b
     pure $! if needed then branchId b : threads else threads
 
@@ -228,9 +227,9 @@ claimStopRequests = foldM asked []
 claimStopRequest :: Branch a -> IO Bool
 claimStopRequest b = do
   over <- isJust <$> tryReadEnd (branchThread b)
-  asked <- readIORef (branchAsked b)
-  let needed = not (over || asked)
-  when needed $ writeIORef (branchAsked b) True
+  requested <- readIORef (stopRequested b)
+  let needed = not (over || requested)
+  when needed $ writeIORef (stopRequested b) True
   pure needed
 
 -- | Waits for the end of the branch.
@@ -260,8 +259,8 @@ result = \case
 -- | How a branch ended whose action ended so. It is called in the branch's own thread: an
 -- exception may itself be undefined, and to look at it throws, which must happen to no
 -- operator that still has branches. What that throws is the fault.
-classified :: Either SomeException a -> IO (Outcome a)
-classified = \case
+classify :: Either SomeException a -> IO (Outcome a)
+classify = \case
   Right a -> pure (Completed a)
   Left e -> do
     self <- myThreadId
@@ -298,33 +297,3 @@ instance Show Stop where
 instance Exception Stop where
   toException = asyncExceptionToException
   fromException = asyncExceptionFromException
-
--- | What is thrown when a behaviour was cancelled and a cleanup faulted on the way
--- out: the cancellation and the fault, as one asynchronous exception, so that no
--- handler for ordinary exceptions takes it for the end of the matter.
---
--- An operator that asked for the stop takes the fault out and throws it, as the
--- fault that it is. You meet the pair itself where a cancellation came from
--- outside this library, from 'System.Timeout.timeout' say.
---
--- @since 0.1.0.0
-data StoppedWithFault = StoppedWithFault
-  { stoppedBy :: !SomeException
-  -- ^ The cancellation.
-  , stoppedFault :: !SomeException
-  -- ^ The leftmost fault of the behaviours that it stopped.
-  }
-
-instance Show StoppedWithFault where
-  showsPrec precedence (StoppedWithFault cause fault) =
-    showParen (precedence > 10) $
-      showString "StoppedWithFault "
-        . showsPrec 11 cause
-        . showString " "
-        . showsPrec 11 fault
-
-instance Exception StoppedWithFault where
-  toException = asyncExceptionToException
-  fromException = asyncExceptionFromException
-  displayException (StoppedWithFault (SomeException cause) (SomeException fault)) =
-    "stopped by " ++ displayException cause ++ ", and while stopping: " ++ displayException fault

@@ -20,7 +20,7 @@ module Behavior.Sim.Mock
     Mock
   , newMock
   , begin
-  , remark
+  , note
 
     -- * What the robot does
   , action
@@ -84,7 +84,7 @@ module Behavior.Sim.Mock
   , faultOf
   , interruptionOf
   , becoming
-  , remarked
+  , noted
   , anyOf
   , during
   , outside
@@ -97,9 +97,9 @@ module Behavior.Sim.Mock
   , being
   ) where
 
+import Behavior.Internal.Mock.Action
 import Behavior.Internal.Mock.Claim
 import Behavior.Internal.Mock.Condition
-import Behavior.Internal.Mock.Action
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Script

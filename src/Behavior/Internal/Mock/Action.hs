@@ -21,9 +21,9 @@ import Data.Maybe (fromMaybe)
 
 import Behavior.Internal.Failure (Behavior, Failed (..), isCancellation, isFailure)
 import Behavior.Internal.Mock.Record
-import Behavior.Internal.Runtime
 import Behavior.Internal.Mock.Script
 import Behavior.Internal.Mock.World
+import Behavior.Internal.Runtime
 import Behavior.Internal.Sim.Text
 
 -- $setup
@@ -54,7 +54,7 @@ import Behavior.Internal.Sim.Text
 action :: Mock -> String -> [Script a] -> IO (Behavior a)
 action mock name scripts = do
   checkScripts ("action " ++ show name) scripts
-  christen mock "action" name
+  registerName mock "action" name
   calls <- newIORef Map.empty
   pure (play mock (nextCall mock calls name "" scripts))
 
@@ -69,7 +69,7 @@ action mock name scripts = do
 -- @since 0.1.0.0
 actionOn :: Show x => Mock -> String -> (x -> [Script a]) -> IO (x -> Behavior a)
 actionOn mock name scripts = do
-  christen mock "action" name
+  registerName mock "action" name
   calls <- newIORef Map.empty
   pure $ \x -> do
     -- Those of an argument can be checked only by one who has the argument.
@@ -91,12 +91,12 @@ actionOn mock name scripts = do
 sensor :: Show a => Mock -> String -> [Script a] -> IO (Behavior a)
 sensor mock name scripts = do
   checkScripts ("sensor " ++ show name) scripts
-  christen mock "sensor" name
+  registerName mock "sensor" name
   calls <- newIORef Map.empty
   newest <- newIORef Nothing
-  let say t what = tell mock (RecordEntry t name "" 1 what)
+  let say t what = recordEntry mock (RecordEntry t name "" 1 what)
       telling =
-        Telling
+        Reporting
           { says = \t what -> when (isTrouble what) (say t what)
           , gives = \t a -> do
               let value = Just (show a)
@@ -113,7 +113,7 @@ sensor mock name scripts = do
     _ -> False
 
 -- | How a call puts on record what happens to it.
-data Telling a = Telling
+data Reporting a = Reporting
   { says :: Seconds -> EntryKind -> IO ()
   , gives :: Seconds -> a -> IO ()
   -- ^ It returns this.
@@ -123,11 +123,11 @@ data Telling a = Telling
 type Calls a = IORef (Map String (Int, [Script a]))
 
 -- | The script whose turn it is, and how to tell of it.
-nextCall :: Mock -> Calls a -> String -> String -> [Script a] -> IO (Script a, Telling a)
+nextCall :: Mock -> Calls a -> String -> String -> [Script a] -> IO (Script a, Reporting a)
 nextCall mock calls name x scripts = do
   (n, script) <- takeTurn calls x scripts
-  let say t what = tell mock (RecordEntry t name x n what)
-  pure (script, Telling {says = say, gives = \t _ -> say t Succeeds})
+  let say t what = recordEntry mock (RecordEntry t name x n what)
+  pure (script, Reporting {says = say, gives = \t _ -> say t Succeeds})
 
 -- | Takes the number of the call and its script, in one step, whoever calls at the
 -- same time.
@@ -139,7 +139,7 @@ takeTurn calls x scripts = atomicModifyIORef' calls $ \old ->
   next (_, []) = errorWithoutStackTrace "unreachable: no script"
 
 -- | Plays one call.
-play :: Mock -> IO (Script a, Telling a) -> Behavior a
+play :: Mock -> IO (Script a, Reporting a) -> Behavior a
 play mock next = do
   -- Here, while the time is asked for, a cancellation comes before all else.
   (zero, begun) <- clock mock
@@ -161,8 +161,8 @@ play mock next = do
     says telling (begun - zero) Begins
     try (restore itsTime) >>= \heard -> case (heard, stopping script) of
       (Right (), _) -> finish
-      (Left e, CleansUp seconds instead) -> say AskedToStop >> cleanUp seconds instead (e :: SomeException)
-      (Left _, GoesOn) -> say AskedToStop >> uninterruptibleMask_ itsTime >> finish
+      (Left e, CleansUp seconds instead) -> say StopRequested >> cleanUp seconds instead (e :: SomeException)
+      (Left _, GoesOn) -> say StopRequested >> uninterruptibleMask_ itsTime >> finish
 
 -- | Lets so many seconds pass from a moment on. Even if there are none, it is a
 -- point where a cancellation can arrive.
@@ -176,8 +176,8 @@ pass seconds since
 ending :: SomeException -> EntryKind
 ending e
   | isCancellation e = Stops
-  | isFailure e = Fails (legible (maybe (show e) reason (fromException e)))
-  | otherwise = Faults (legible (show e))
+  | isFailure e = Fails (safeShow (maybe (show e) reason (fromException e)))
+  | otherwise = Faults (safeShow (show e))
  where
   reason (FailedBecause why) = why
   reason Failed = "for no reason given"

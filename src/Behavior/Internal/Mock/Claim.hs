@@ -126,7 +126,7 @@ always s = Claim ("always " ++ spanWords s) (spanNames s) $ \rows (Origin origin
         row : _ -> Just ("it was not so at " ++ inSeconds (time row), [row])
  where
   -- While the world is being set up, not all of it is there yet.
-  setting entry = case happening entry of
+  setting entry = case entryKind entry of
     Is _ -> True
     _ -> False
 
@@ -180,7 +180,7 @@ claimOf words' m judge = Claim words' (momentNames m) $ \rows origin@(Origin aft
   judge origin (filter ((> after) . fst) (occurrences m rows))
 
 time :: (Int, RecordEntry) -> Seconds
-time = happenedAt . snd
+time = entryTime . snd
 
 -- | Whether a claim holds, to be said as hspec says it:
 -- @record \`shouldSatisfy\` holds claim@. ('Behavior.Sim.Mock.shouldRecord' says why

@@ -24,9 +24,9 @@ import Data.Maybe (isJust, listToMaybe)
 
 import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Mock.Record
-import Behavior.Internal.Runtime
-import Behavior.Internal.Source (Signal (..), Source (workers), View (..), Worker (..), viewing)
 import Behavior.Internal.Mock.World
+import Behavior.Internal.Runtime
+import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..), Worker (..), fromView)
 
 -- $setup
 -- >>> import Behavior
@@ -81,12 +81,12 @@ partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Cond
 partialCondition mock name changes = do
   -- Of endlessly many only so many can be looked at beforehand.
   for_ (zip (Nothing : map Just times) (take 1000 times)) $ uncurry checkTime
-  christen mock "condition" name
+  registerName mock "condition" name
   first <- newTVarIO (initial >>= snd)
   rest <- newTVarIO (if isJust initial then drop 1 changes else changes)
   let c = Condition mock name first rest told
-  for_ (initial >>= snd) $ \a -> tell mock (entry c 0 (Is (show a)))
-  foretell mock $ \until' -> (\(_, _, said) -> said) <$> due c (<= until')
+  for_ (initial >>= snd) $ \a -> recordEntry mock (entry c 0 (Is (show a)))
+  registerPending mock $ \until' -> (\(_, _, said) -> said) <$> due c (<= until')
   pure c
  where
   initial = listToMaybe [(t, a) | (t, a) <- take 1 changes, t == 0]
@@ -98,7 +98,7 @@ partialCondition mock name changes = do
         ++ maybe " is no such time" (\b -> " must not come after " ++ show b) before
   told old new
     | fmap show old == fmap show new = []
-    | otherwise = [maybe LosesItsValue (Becomes . show) new]
+    | otherwise = [maybe LosesValue (Becomes . show) new]
 
 entry :: Condition a -> Seconds -> EntryKind -> RecordEntry
 entry c t = RecordEntry t (nameOf c) "" 1
@@ -126,7 +126,7 @@ upToDate c transaction = do
       writeTVar (current c) new >> writeTVar (ahead c) others
       (b, more) <- transaction zero t
       pure (b, said ++ more)
-    traverse_ (tell (world c)) said
+    traverse_ (recordEntry (world c)) said
     pure b
 
 -- | The condition as a signal, to be watched: it wakes its operator at each change.
@@ -152,7 +152,7 @@ signal c = Signal $ \_ -> do
       valueOr none = (readTVar made >>= check) >> readTVar (current c) >>= maybe none pure
       noneAnyMore = failWith (nameOf c ++ " has no value any more")
   pure
-    (viewing (pure (View (valueOr retry) (valueOr noneAnyMore))))
+    (fromView (pure (View (valueOr retry) (valueOr noneAnyMore))))
       { workers = [Worker "clock" (const wake <$ writeTVar made False) | changesByItself]
       }
 

@@ -17,7 +17,7 @@ module Behavior.Internal.Mock.Moment
   , faultOf
   , interruptionOf
   , becoming
-  , remarked
+  , noted
   , anyOf
   , during
   , outside
@@ -98,7 +98,7 @@ isFaulting _ = False
 --
 -- @since 0.1.0.0
 interruptionOf :: String -> Moment
-interruptionOf = momentOf "is asked to stop" (== AskedToStop)
+interruptionOf = momentOf "is interrupted" (== StopRequested)
 
 -- | The condition, or what the sensor reads, becomes this; or is this from the start.
 --
@@ -106,18 +106,18 @@ interruptionOf = momentOf "is asked to stop" (== AskedToStop)
 becoming :: Show a => String -> a -> Moment
 becoming name value = momentOf ("becomes " ++ show value) (`elem` [Is (show value), Becomes (show value)]) name
 
--- | Somebody has said this by 'Behavior.Sim.Mock.remark'.
+-- | Somebody has said this by 'Behavior.Sim.Mock.note'.
 --
 -- @since 0.1.0.0
-remarked :: String -> Moment
-remarked text = (momentOf "is remarked" (== Remarked) text) {momentNames = []}
+noted :: String -> Moment
+noted text = (momentOf "is noted" (== Noted) text) {momentNames = []}
 
 momentOf :: String -> (EntryKind -> Bool) -> String -> Moment
 momentOf verb isIt name =
   Moment
     { momentWords = show name ++ " " ++ verb
     , momentNames = [name]
-    , occurrences = filter $ \(_, entry) -> entry `isAbout` name && isIt (happening entry)
+    , occurrences = filter $ \(_, entry) -> entry `isAbout` name && isIt (entryKind entry)
     }
 
 isAbout :: RecordEntry -> String -> Bool
@@ -235,8 +235,8 @@ data Interval = Interval
 running :: String -> Interval
 running name =
   Interval (show name ++ " is running") [name] $
-    stretchesFrom (\e -> e `isAbout` name && happening e == Begins) $ \begun e ->
-      fullName e == fullName begun && call e == call begun && isEnd (happening e)
+    stretchesFrom (\e -> e `isAbout` name && entryKind e == Begins) $ \begun e ->
+      fullName e == fullName begun && call e == call begun && isEnd (entryKind e)
 
 -- | The condition, or what the sensor reads, is this.
 --
@@ -244,11 +244,11 @@ running name =
 being :: Show a => String -> a -> Interval
 being name value =
   Interval (show name ++ " is " ++ show value) [name] $
-    stretchesFrom (\e -> e `isAbout` name && happening e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
-      e `isAbout` name && changes (happening e)
+    stretchesFrom (\e -> e `isAbout` name && entryKind e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
+      e `isAbout` name && changes (entryKind e)
  where
   changes (Becomes _) = True
-  changes what = what == LosesItsValue
+  changes what = what == LosesValue
 
 stretchesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Lines -> [(Int, Int)]
 stretchesFrom begins ends rows =

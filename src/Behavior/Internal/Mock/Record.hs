@@ -37,33 +37,33 @@ instance Show Record where
 --
 -- @since 0.1.0.0
 data RecordEntry = RecordEntry
-  { happenedAt :: Seconds
+  { entryTime :: Seconds
   -- ^ When: in seconds since the clock of the world was started.
   , subject :: String
-  -- ^ The name of the action, condition or sensor; or what was remarked.
+  -- ^ The name of the action, condition or sensor; or what was noted.
   , argument :: String
   -- ^ The argument, shown, of an action that has one; else nothing.
   , call :: Int
   -- ^ Which call of the action (with this argument) it belongs to, from 1.
-  , happening :: EntryKind
+  , entryKind :: EntryKind
   }
   deriving (Eq)
 
 -- | Without the time: a line of a schedule, say, has that already.
 instance Show RecordEntry where
-  show entry = fullName entry ++ told (happening entry) ++ again
+  show entry = fullName entry ++ told (entryKind entry) ++ again
    where
     told what = case what of
       Begins -> ": begins"
       Succeeds -> ": done"
       Fails why -> ": fails, " ++ why
       Faults why -> ": faults, " ++ why
-      AskedToStop -> ": is asked to stop"
+      StopRequested -> ": stop requested"
       Stops -> ": has stopped"
       Is value -> ": is " ++ value
       Becomes value -> ": becomes " ++ value
-      LosesItsValue -> ": has no value any more"
-      Remarked -> ""
+      LosesValue -> ": has no value any more"
+      Noted -> ""
     again
       | call entry > 1 = " (call " ++ show (call entry) ++ ")"
       | otherwise = ""
@@ -81,7 +81,7 @@ data EntryKind
   | -- | An action, or its cleanup, or a reading of a sensor faults: why.
     Faults String
   | -- | An action hears that it is to stop.
-    AskedToStop
+    StopRequested
   | -- | An action that was asked to stop has stopped, cleanup included.
     Stops
   | -- | A condition has this value, shown, from the start.
@@ -89,16 +89,16 @@ data EntryKind
   | -- | A condition, or what a sensor reads, becomes this, shown.
     Becomes String
   | -- | A condition has no value any more.
-    LosesItsValue
+    LosesValue
   | -- | Somebody said so.
-    Remarked
+    Noted
   deriving (Eq, Ord, Show)
 
 -- | A record of what was noted, the newest first. A thread notes its time and then
 -- the entry, so that entries of several threads can be noted in another order than
 -- that of their times. Entries of one moment stay in the order of the noting.
 recorded :: [String] -> [RecordEntry] -> Record
-recorded names = Record names . sortOn happenedAt . reverse
+recorded names = Record names . sortOn entryTime . reverse
 
 -- | The name of whom an entry is about, with the argument if there is one.
 fullName :: RecordEntry -> String
@@ -108,10 +108,10 @@ fullName entry
 
 -- | The lines of a timeline.
 timeline :: [RecordEntry] -> [String]
-timeline lines' = [padded (inSeconds (happenedAt entry)) ++ "  " ++ show entry | entry <- lines']
+timeline lines' = [padded (inSeconds (entryTime entry)) ++ "  " ++ show entry | entry <- lines']
  where
   padded time = replicate (width - length time) ' ' ++ time
-  width = maximum (0 : map (length . inSeconds . happenedAt) lines')
+  width = maximum (0 : map (length . inSeconds . entryTime) lines')
 
 -- | A time to read: sums of seconds are off by less than anybody wants to see.
 inSeconds :: Seconds -> String

@@ -12,13 +12,13 @@ module Behavior.Internal.Mock.World
   ( Mock
   , newMock
   , begin
-  , remark
+  , note
 
     -- * For what is in the world
   , clock
-  , tell
-  , christen
-  , foretell
+  , recordEntry
+  , registerName
+  , registerPending
 
     -- * The record
   , happened
@@ -32,8 +32,8 @@ import Control.Monad (join, void, when)
 import Data.IORef
 import Data.Maybe (fromMaybe, isNothing)
 
-import Behavior.Internal.Mock.Claim (Claim, verdict)
 import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Mock.Claim (Claim, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Runtime
 
@@ -52,7 +52,7 @@ data Mock = Mock
   , elapsed :: IORef (IO Seconds)
   -- ^ How long it has gone in a simulation, until that ended; in reality this is zero.
   , names :: IORef [String]
-  , noted :: IORef [RecordEntry]
+  , newestEntries :: IORef [RecordEntry]
   -- ^ Newest first.
   , unseen :: IORef [Seconds -> STM [RecordEntry]]
   -- ^ The changes until then that were due, but that nobody has seen yet.
@@ -85,27 +85,27 @@ clock mock = do
 
 -- | Notes, which nothing can block or interrupt where exceptions are masked. When the run
 -- has ended, the record has.
-tell :: Mock -> RecordEntry -> IO ()
-tell mock entry = do
+recordEntry :: Mock -> RecordEntry -> IO ()
+recordEntry mock entry = do
   goesOn <- isRecorded
   when goesOn $ do
-    atomicModifyIORef' (noted mock) (\old -> (entry : old, ()))
+    atomicModifyIORef' (newestEntries mock) (\old -> (entry : old, ()))
     annotate (show entry)
 
--- | Puts a remark of your own on record.
+-- | Puts a note of your own on record.
 --
--- >>> remark mock "a sheep crosses the road"
--- >>> mock `shouldRecord` eventually (remarked "a sheep crosses the road")
+-- >>> note mock "a sheep crosses the road"
+-- >>> mock `shouldRecord` eventually (noted "a sheep crosses the road")
 --
 -- @since 0.1.0.0
-remark :: Mock -> String -> Behavior ()
-remark mock text = do
+note :: Mock -> String -> Behavior ()
+note mock text = do
   (zero, t) <- clock mock
-  mask_ $ tell mock (RecordEntry (t - zero) text "" 1 Remarked)
+  mask_ $ recordEntry mock (RecordEntry (t - zero) text "" 1 Noted)
 
 -- | Gives a thing of the world its name, which must not be another one's.
-christen :: Mock -> String -> String -> IO ()
-christen mock kind name = do
+registerName :: Mock -> String -> String -> IO ()
+registerName mock kind name = do
   taken <- atomicModifyIORef' (names mock) $ \old ->
     if name `elem` old then (old, True) else (name : old, False)
   when taken . throwIO . ErrorCall $
@@ -113,8 +113,8 @@ christen mock kind name = do
 
 -- | Has changes put on record (of those that were due by a given time) that nobody
 -- has seen.
-foretell :: Mock -> (Seconds -> STM [RecordEntry]) -> IO ()
-foretell mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
+registerPending :: Mock -> (Seconds -> STM [RecordEntry]) -> IO ()
+registerPending mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
 
 -- | All that has happened until now. A change of a condition is on record once
 -- something later is, or a simulated run has come to its time, whether or not anybody has
@@ -128,18 +128,18 @@ foretell mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
 -- @since 0.1.0.0
 happened :: Mock -> IO Record
 happened mock = do
-  seen <- readIORef (noted mock)
+  seen <- readIORef (newestEntries mock)
   conditions <- readIORef (unseen mock)
   came <- join (readIORef (elapsed mock))
-  due <- atomically (traverse ($ maximum (came : map happenedAt seen)) conditions)
+  due <- atomically (traverse ($ maximum (came : map entryTime seen)) conditions)
   known <- readIORef (names mock)
   pure (recorded (reverse known) (reverse (join due) ++ seen))
 
 -- | Throws a 'BrokenClaim', which says why, unless the claim holds of what has
 -- happened. To be used as hspec's expectations are.
 --
--- >>> mock `shouldRecord` eventually (remarked "all is well")
--- *** Exception: This does not hold: eventually "all is well" is remarked.
+-- >>> mock `shouldRecord` eventually (noted "all is well")
+-- *** Exception: This does not hold: eventually "all is well" is noted.
 -- It never came.
 -- <BLANKLINE>
 --

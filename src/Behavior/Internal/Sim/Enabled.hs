@@ -35,7 +35,7 @@ import Behavior.Internal.Sim.State
 file :: Sim -> Task -> IO ()
 file sim task = do
   unfile sim task
-  place' <- readIORef (place task)
+  place' <- readIORef (blockedAt task)
   certain <- canRaise place'
   case place' of
     Gone -> pure ()
@@ -48,12 +48,12 @@ file sim task = do
         if due then intoReady else modifyIORef' (sleepers sim) (Map.insert (t, taskNumber task) task)
       Delivery _ _ -> possible sim op >>= \is -> when is intoReady
       Throwing _ _ -> intoReady
-      Free -> intoReady
+      AlwaysEnabled -> intoReady
  where
   intoReady = modifyIORef' (ready sim) (Map.insert (taskNumber task) task)
   -- Whatever becomes of its operation, it can run: if it has to wait, it receives.
   canRaise place' = do
-    arrived <- isJust <$> readIORef (raised task)
+    arrived <- isJust <$> readIORef (pendingException task)
     waiting <- not . null <$> readIORef (pending task)
     pure $ arrived || case place' of
       Before MaskedInterruptible _ -> waiting
@@ -63,7 +63,7 @@ file sim task = do
 unfile :: Sim -> Task -> IO ()
 unfile sim task = do
   modifyIORef' (ready sim) (Map.delete (taskNumber task))
-  readIORef (place task) >>= \case
+  readIORef (blockedAt task) >>= \case
     Before _ (Transaction _ _) -> modifyIORef' (awaiting sim) (IntMap.delete (taskNumber task))
     Before _ (Moment t) -> modifyIORef' (sleepers sim) (Map.delete (t, taskNumber task))
     _ -> pure ()
@@ -73,29 +73,29 @@ enabled :: Sim -> IO (Map Int Task)
 enabled sim = do
   certain <- readIORef (ready sim)
   waiting <- readIORef (awaiting sim)
-  able <- filterM (canCommit . snd) (IntMap.toAscList waiting)
-  pure (Map.union (Map.fromDistinctAscList able) certain)
+  enabledTasks <- filterM (canCommit . snd) (IntMap.toAscList waiting)
+  pure (Map.union (Map.fromDistinctAscList enabledTasks) certain)
  where
   canCommit task =
-    readIORef (place task) >>= \case
+    readIORef (blockedAt task) >>= \case
       Before _ op -> possible sim op
       _ -> pure False
 
 -- | Whether the operation can be done now.
 possible :: Sim -> Operation -> IO Bool
 possible sim = \case
-  Free -> pure True
+  AlwaysEnabled -> pure True
   Throwing _ _ -> pure True
   Moment t -> (t <=) <$> readIORef (time sim)
   Delivery _ p -> readIORef (released p)
   Transaction wouldRun look -> do
-    Look looked was waited <- readIORef look
+    EnabledCache looked was waited <- readIORef look
     n <- readIORef (commits sim)
     if looked == n
       then pure was
       else do
         is <- wouldRun
-        is <$ writeIORef look (Look n is (waited || not is))
+        is <$ writeIORef look (EnabledCache n is (waited || not is))
 
 -- | What becomes of an exception that is thrown to a task now.
 data Receives
@@ -110,9 +110,9 @@ data Receives
 -- to wait, or it would have received that.)
 receives :: Sim -> Task -> IO Receives
 receives sim target = do
-  arrived <- isJust <$> readIORef (raised target)
+  arrived <- isJust <$> readIORef (pendingException target)
   waiting <- not . null <$> readIORef (pending target)
-  readIORef (place target) >>= \case
+  readIORef (blockedAt target) >>= \case
     Gone -> pure Never
     Before Unmasked _ | not arrived -> pure AtOnce
     Before MaskedInterruptible op | not (arrived || waiting) -> do
@@ -126,7 +126,7 @@ receives sim target = do
 -- waits at an 'Control.Concurrent.MVar', as a sleeper does, does not.)
 hasWaited :: Operation -> IO Bool
 hasWaited = \case
-  Transaction _ look -> (\(Look _ _ waited) -> waited) <$> readIORef look
+  Transaction _ look -> (\(EnabledCache _ _ waited) -> waited) <$> readIORef look
   _ -> pure False
 
 -- | The time has come to this moment: the sleepers that are due can run.

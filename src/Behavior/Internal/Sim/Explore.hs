@@ -93,7 +93,7 @@ tryExplore plan property = case search plan of
   Shrink s -> only s (reduced 1)
  where
   o = runOptions plan
-  try' chooser' = attempting o chooser' property
+  try' chooser' = tryRun o chooser' property
 
   only s onFailure = do
     t <- try' (policy s)
@@ -135,7 +135,7 @@ tryExplore plan property = case search plan of
   reduced i e t = do
     (fewer, e') <- shrunk (switches t) e
     (fewest, e'') <- simplest fewer e'
-    again <- attempting o {detailed = True} (switching True fewest) property
+    again <- tryRun o {detailed = True} (preempting True fewest) property
     let why = fromMaybe (toException (Unrepeatable (showException plan e''))) (thrown again)
     pure Counterexample {failing = Preempting fewest, reason = why, failingSteps = happened again, schedulesTried = i, foundBy = plan}
 
@@ -169,15 +169,15 @@ tryExplore plan property = case search plan of
     attemptAll budget chunk (candidate : more) these why
       | budget <= 0 = pure (these, why)
       | otherwise = do
-          t <- try' (switching False candidate)
+          t <- try' (preempting False candidate)
           case thrown t of
             Just e' | length (switches t) < length these -> go (budget - 1) (min chunk (length (switches t))) (switches t) e'
             _ -> attemptAll (budget - 1) chunk more these why
   without n these = [take i these ++ drop (i + n) these | i <- [0, n .. length these - 1]]
 
 -- | Runs the property once.
-attempting :: Options -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
-attempting o choosing property = do
+tryRun :: Options -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
+tryRun o choosing property = do
   made <- newIORef Nothing
   let simulating act = do
         before <- readIORef made

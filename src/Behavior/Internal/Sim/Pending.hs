@@ -39,9 +39,9 @@ throwAt sim from target e = do
   case how of
     Never -> pure Nothing
     AtOnce -> do
-      writeIORef (raised target) (Just e)
+      writeIORef (pendingException target) (Just e)
       -- If the target itself waits in a 'throwTo', that has ended by this.
-      here <- readIORef (place target)
+      here <- readIORef (blockedAt target)
       case here of
         Before _ (Delivery further p) -> withdraw sim further p
         _ -> pure ()
@@ -56,7 +56,7 @@ throwAt sim from target e = do
     free <- newIORef False
     helping <- mask_ $ forkOnWithUnmask (capability sim) (\unmask -> unmask (throwTo thread e))
     untilBlocked helping
-    pure Pending {helper = helping, thrown = e, released = free, sender = from}
+    pure Pending {throwingThread = helping, thrown = e, released = free, sender = from}
   untilBlocked helping = do
     status <- threadStatus helping
     unless (isBlocked status || isOver status) (yield >> untilBlocked helping)
@@ -71,7 +71,7 @@ withdraw sim target p = do
   done <- readIORef (released p)
   unless done $ do
     uninterruptibleMask_ (release p)
-    modifyIORef' (pending target) (filter ((/= helper p) . helper))
+    modifyIORef' (pending target) (filter ((/= throwingThread p) . throwingThread))
     -- It was ready because of this, if it does not have the turn.
     was <- Map.member (taskNumber target) <$> readIORef (ready sim)
     when was (file sim target)
@@ -87,11 +87,11 @@ withdrawAll sim target = do
 release :: Pending -> IO ()
 release p = do
   writeIORef (released p) True
-  killThread (helper p)
+  killThread (throwingThread p)
   untilOver p
 
 untilOver :: Pending -> IO ()
-untilOver p = threadStatus (helper p) >>= \status -> unless (isOver status) (yield >> untilOver p)
+untilOver p = threadStatus (throwingThread p) >>= \status -> unless (isOver status) (yield >> untilOver p)
 
 wakeSender :: Sim -> Pending -> IO ()
 wakeSender sim p = for_ (sender p) (file sim)
@@ -101,17 +101,17 @@ settle :: Sim -> IO ()
 settle sim = do
   me <- readIORef (current sim)
   all' <- readIORef (pending me)
-  unless (null all') (settled sim me all')
+  unless (null all') (settlePending sim me all')
 {-# INLINE settle #-}
 
-settled :: Sim -> Task -> [Pending] -> IO ()
-settled sim me all' = do
-  (still, gone) <- partitionM (fmap isBlocked . threadStatus . helper) all'
+settlePending :: Sim -> Task -> [Pending] -> IO ()
+settlePending sim me all' = do
+  (still, gone) <- partitionM (fmap isBlocked . threadStatus . throwingThread) all'
   writeIORef (pending me) still
   for_ gone $ \p -> do
     untilOver p
     writeIORef (released p) True
-    noteStep sim (ReceivesException (legible (show (thrown p))))
+    recordStep sim (ReceivesException (safeShow (show (thrown p))))
     wakeSender sim p
  where
   partitionM test list = do

@@ -8,7 +8,7 @@ module Behavior.Internal.Sim.Policy
   ( Policy (..)
   , Decision (..)
   , policy
-  , switching
+  , preempting
   , random
   , fully
   ) where
@@ -46,14 +46,14 @@ data Policy = Policy
 
 -- | The policy that a schedule stands for.
 policy :: Schedule -> IO Policy
-policy NonPreemptive = switching True []
-policy (Preempting exceptions) = switching True exceptions
+policy NonPreemptive = preempting True []
+policy (Preempting exceptions) = preempting True exceptions
 policy (Seeded seed) = random seed
 
 -- | The non-preemptive schedule but for some exceptions. Those that do not fit are refused, or (when the
 -- schedule is being shrunk) left out.
-switching :: Bool -> [(Int, Int)] -> IO Policy
-switching strictly exceptions = do
+preempting :: Bool -> [(Int, Int)] -> IO Policy
+preempting strictly exceptions = do
   left <- newIORef exceptions
   pure
     Policy
@@ -115,7 +115,7 @@ random seed = do
 -- decision that there was after the last exception.
 fully :: [(Int, Int)] -> (Decision -> IO ()) -> IO Policy
 fully exceptions tell = do
-  inner <- switching True exceptions
+  inner <- preempting True exceptions
   pure
     inner
       { askAt = pure minBound

@@ -17,10 +17,10 @@ import Control.Exception (SomeException (..), displayException)
 import Data.List (groupBy, intercalate, isInfixOf)
 import Numeric (showFFloat)
 
+import Behavior.Internal.Runtime.Backend (Label)
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Text
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator (Label)
 
 -- $setup
 -- >>> import Behavior
@@ -46,7 +46,7 @@ explain = \case
   Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
   Livelock labels -> "livelock: the virtual time stands still while these run on and on: " ++ commas labels
   OutOfTime -> "the virtual time has come to the end that was set"
-  BlockedOutside label' blocked -> show label' ++ " waited outside of the simulation, " ++ instead blocked
+  BlockedOutside label' blocked -> show label' ++ " waited outside of the simulation, " ++ usualOtherwise blocked
   ExternalWakeup waiting ->
     listed
       "something outside of the simulation changed what these waited for (a thread of forkIO or async? \
@@ -60,8 +60,8 @@ explain = \case
 listed :: String -> [Waiting] -> String
 listed title = intercalate "\n  " . (title :) . map (\(Waiting who' what') -> show who' ++ " waits for " ++ what')
 
-instead :: Blocked -> String
-instead = \case
+usualOtherwise :: Blocked -> String
+usualOtherwise = \case
   InMVar ->
     "at an MVar or for the time (takeMVar, threadDelay, System.Timeout.timeout, forkIO and a wait for it, \
     \output that nobody reads): \
@@ -163,4 +163,4 @@ commas = intercalate ", " . map show
 
 -- | What an exception says of itself, without GHC's own additions.
 text :: SomeException -> String
-text (SomeException e) = legible (displayException e)
+text (SomeException e) = safeShow (displayException e)

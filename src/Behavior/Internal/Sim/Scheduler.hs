@@ -29,13 +29,13 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust)
 import Foreign.StablePtr (newStablePtr)
 
+import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Text
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator
 
 -- | What the seam calls.
 simulation :: Sim -> Simulator
@@ -43,7 +43,7 @@ simulation sim =
   Simulator
     { isRunning = \self -> (== Just self) . taskThread <$> readIORef (current sim)
     , spawn = \label' body publish -> do
-        operation sim Free
+        operation sim AlwaysEnabled
         me <- readIORef (current sim)
         task <- launch sim (taskNumber me) label' body publish
         maybe (throwIO (ErrorCall "unreachable")) pure (taskThread task)
@@ -54,24 +54,24 @@ simulation sim =
     , send = \target e -> withTarget target $ \me there ->
         void (enlist sim (taskNumber me) (Label "interrupt" "messenger") Nothing (Before MaskedUninterruptible (Throwing there e)))
     , transact = transaction sim
-    , clock = operation sim Free >> readIORef (time sim)
+    , clock = operation sim AlwaysEnabled >> readIORef (time sim)
     , await = \moment -> do
-        detail sim (Sleeps moment)
+        recordDetail sim (Sleeps moment)
         operation sim (Moment moment)
-    , pause = operation sim Free
+    , pause = operation sim AlwaysEnabled
     , recording = not <$> readIORef (unwinding sim)
     , lookAtClock = readIORef (time sim)
     , record = \event -> settle sim >> case event of
-        Started _ -> noteStep sim Starts
+        Started _ -> recordStep sim Starts
         Ended _ -> pure () -- It ends when that is known: see 'leave'.
-        Noted text -> noteStep sim (Note text)
+        Annotated text -> recordStep sim (Note text)
     }
  where
   -- One that has ended hears nothing.
   withTarget target act = do
     found <- Map.lookup target <$> readIORef (threads sim)
-    for_ found (\there -> detail sim (Throws (taskNumber there) (taskLabel there)))
-    operation sim Free
+    for_ found (\there -> recordDetail sim (Throws (taskNumber there) (taskLabel there)))
+    operation sim AlwaysEnabled
     me <- readIORef (current sim)
     for_ found (act me)
   unlessUnwinding act = readIORef (unwinding sim) >>= \ending -> unless ending act
@@ -89,7 +89,7 @@ launch sim mother label' body publish = do
     uninterruptibleMask_ (leave sim self (publish a))
   enlist sim mother label' (Just (thread, entrance)) Unstarted
 
-enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> Place -> IO Task
+enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> Position -> IO Task
 enlist sim mother label' thread here = do
   entrance <- maybe newEmptyMVar (pure . snd) thread
   n <- readIORef (nextNumber sim)
@@ -104,24 +104,24 @@ enlist sim mother label' thread here = do
 operation :: Sim -> Operation -> IO ()
 operation sim op = do
   settle sim
-  quick <- keeps sim
+  quick <- keepsTurn sim
   possible' <- if quick then possible sim op else pure False
   unless possible' (reschedule sim op)
 {-# INLINE operation #-}
 
 -- | Counts a scheduling point; whether who has the turn keeps it, if it can go on.
-keeps :: Sim -> IO Bool
-keeps sim = tick sim >>= \n -> (n <) <$> readIORef (askingAt sim)
-{-# INLINE keeps #-}
+keepsTurn :: Sim -> IO Bool
+keepsTurn sim = tick sim >>= \n -> (n <) <$> readIORef (nextDecisionAt sim)
+{-# INLINE keepsTurn #-}
 
 -- | Runs a transaction, in its turn.
 transaction :: Sim -> STM a -> IO a
 transaction sim act = do
   settle sim
-  detail sim Transacts
-  quick <- keeps sim
+  recordDetail sim Transacts
+  quick <- keepsTurn sim
   done <- if quick then tried else pure Nothing
-  maybe (newIORef (Look (-1) False False) >>= waiting) pure done
+  maybe (newIORef (EnabledCache (-1) False False) >>= waiting) pure done
  where
   tried = do
     result <- STM.atomically ((Just <$> act) `orElse` pure Nothing)
@@ -153,9 +153,9 @@ reschedule sim op = do
     me <- readIORef (current sim)
     ending <- readIORef (unwinding sim)
     if ending
-      then beingUnwound sim me
+      then isUnwinding sim me
       else do
-        writeIORef (place me) (Before masking op)
+        writeIORef (blockedAt me) (Before masking op)
         file sim me
         next <- choose sim (Just me)
         case next of
@@ -177,11 +177,11 @@ arrive sim me = do
   if ending
     then throwIO Unwind
     else
-      readIORef (raised me) >>= \case
+      readIORef (pendingException me) >>= \case
         Nothing -> pure ()
         Just e -> do
-          writeIORef (raised me) Nothing
-          noteStep sim (ReceivesException (legible (show e)))
+          writeIORef (pendingException me) Nothing
+          recordStep sim (ReceivesException (safeShow (show e)))
           throwIO e
 
 -- | The end of a task is an operation too.
@@ -191,38 +191,38 @@ leave sim me publish = do
   unless ending $ do
     settle sim
     _ <- tick sim
-    reschedule sim Free `catch` \Unwind -> pure ()
+    reschedule sim AlwaysEnabled `catch` \Unwind -> pure ()
   STM.atomically publish
   committed sim
-  unless (taskNumber me == 0) (noteStep sim Ends)
+  unless (taskNumber me == 0) (recordStep sim Ends)
   modifyIORef' (tasks sim) (IntMap.delete (taskNumber me))
   for_ (taskThread me) (modifyIORef' (threads sim) . Map.delete)
-  writeIORef (place me) Gone
+  writeIORef (blockedAt me) Gone
   withdrawAll sim me
   endingNow <- readIORef (unwinding sim)
   if endingNow
-    then putMVar (back sim) ()
+    then putMVar (driverTurn sim) ()
     else
       if taskNumber me == 0
-        then conclude sim Nothing
+        then endRun sim Nothing
         else tick sim >> choose sim Nothing >>= mapM_ (turnTo sim)
 
 -- | The run has ended. Who is not driven yet gives the turn to the driver. Who is has
 -- the turn for good: its operations are done at once, and what would wait is unwound
 -- instead. One that goes on for ever all the same never runs again.
-beingUnwound :: Sim -> Task -> IO ()
-beingUnwound sim me = do
-  isDriven <- readIORef (driven sim)
+isUnwinding :: Sim -> Task -> IO ()
+isUnwinding sim me = do
+  isDriven <- readIORef (driverRuns sim)
   if not isDriven
-    then putMVar (back sim) () >> takeMVar (gate me) >> throwIO Unwind
+    then putMVar (driverTurn sim) () >> takeMVar (gate me) >> throwIO Unwind
     else do
-      n <- readIORef (strikes sim)
-      writeIORef (strikes sim) $! n + 1
+      n <- readIORef (unwindAttempts sim)
+      writeIORef (unwindAttempts sim) $! n + 1
       when (n > 20000) $ do
         -- While this reference lives, the thread is not woken to be told that it is
         -- waited for by nobody.
         _ <- newStablePtr (gate me)
         modifyIORef' (tasks sim) (IntMap.delete (taskNumber me))
-        putMVar (back sim) ()
+        putMVar (driverTurn sim) ()
         takeMVar (gate me)
       when (n > 10000) (throwIO Unwind)

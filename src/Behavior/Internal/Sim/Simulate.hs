@@ -20,8 +20,8 @@ import Data.Void (Void, absurd)
 import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
-import Behavior.Internal.Seam
-import Behavior.Internal.Simulator
+import Behavior.Internal.Runtime.Backend
+import Behavior.Internal.Runtime.Dispatch
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
@@ -91,14 +91,14 @@ simulateBy o chooser' act = do
     main <- launch sim (-1) (Label "main" "") (\begin unmask -> try (unmask (begin >> act)) >>= writeIORef result . Just) (const (pure ()))
     writeIORef (current sim) main
     putMVar (gate main) ()
-    verdict <- try (restore (takeMVar (over sim)))
+    verdict <- try (restore (takeMVar (runEnd sim)))
     left <- fmap taskLabel . filter (isJust . taskThread) . IntMap.elems <$> readIORef (tasks sim)
     time' <- readIORef (time sim)
     made <- reverse <$> readIORef (history sim)
     count <- readIORef (counter sim)
     uninterruptibleMask_ (unwind sim verdict)
     end <- readIORef result
-    switches <- reverse <$> readIORef (taken sim)
+    switches <- reverse <$> readIORef (deviations sim)
     rest <- unused chooser'
     case verdict of
       Left e -> throwIO (e :: SomeException)
@@ -133,10 +133,10 @@ outcomeOf cutOff end rest = case (cutOff, rest, end) of
 unwind :: Sim -> Either SomeException (Maybe (Outcome Void)) -> IO ()
 unwind sim verdict = do
   writeIORef (unwinding sim) True
-  writeIORef (askingAt sim) minBound
+  writeIORef (nextDecisionAt sim) minBound
   when keptTurn recall
   readIORef (tasks sim) >>= mapM_ (withdrawAll sim)
-  writeIORef (driven sim) True
+  writeIORef (driverRuns sim) True
   next
  where
   -- Whoever ran has the turn still.
@@ -159,7 +159,7 @@ unwind sim verdict = do
   soon :: Int -> IO Bool
   soon 0 = pure False
   soon k = do
-    returned <- (||) <$> (isJust <$> tryTakeMVar (back sim)) <*> (isJust <$> tryTakeMVar (over sim))
+    returned <- (||) <$> (isJust <$> tryTakeMVar (driverTurn sim)) <*> (isJust <$> tryTakeMVar (runEnd sim))
     if returned then pure True else threadDelay 1000 >> soon (k - 1)
 
   next = do
@@ -168,9 +168,9 @@ unwind sim verdict = do
       Nothing -> pure ()
       Just (n, task) -> do
         when (isJust (taskThread task)) $ do
-          writeIORef (strikes sim) 0
+          writeIORef (unwindAttempts sim) 0
           writeIORef (current sim) task
           putMVar (gate task) ()
-          takeMVar (back sim)
+          takeMVar (driverTurn sim)
         modifyIORef' (tasks sim) (IntMap.delete n)
         next

@@ -12,24 +12,24 @@ module Behavior.Internal.Sim.State
   ( -- * Simulations
     Sim (..)
   , newSim
-  , conclude
+  , endRun
 
     -- * Tasks
   , Task (..)
-  , Place (..)
+  , Position (..)
   , Operation (..)
-  , Look (..)
+  , EnabledCache (..)
   , Pending (..)
   , Unwind (..)
 
     -- * Counting
-  , turns
+  , turnLimit
   , tick
   , committed
 
     -- * The record
-  , noteStep
-  , detail
+  , recordStep
+  , recordDetail
   ) where
 
 import Control.Concurrent
@@ -42,15 +42,15 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Void (Void)
 
+import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator
 
 -- | A simulation.
 data Sim = Sim
   { options :: !Options
-  , chooser :: !Policy
+  , policyOf :: !Policy
   , capability :: !Int
   -- ^ All tasks are on one, so that handing the turn on is cheap.
   , current :: !(IORef Task)
@@ -69,30 +69,30 @@ data Sim = Sim
   , time :: !(IORef Seconds)
   , counter :: !(IORef Int)
   -- ^ The number of the scheduling point.
-  , askingAt :: !(IORef Int)
+  , nextDecisionAt :: !(IORef Int)
   -- ^ Up to this point, who has the turn keeps it as long as it can go on.
   , rotateAt :: !(IORef Int)
   -- ^ At this point another has to have its turn.
-  , movedAt :: !(IORef Int)
+  , timeMovedAt :: !(IORef Int)
   -- ^ At this point the time moved last.
   , commits :: !(IORef Int)
   -- ^ How many transactions were run: what a waiting one sees may have changed.
-  , taken :: !(IORef [(Int, Int)])
+  , deviations :: !(IORef [(Int, Int)])
   -- ^ The decisions that were not the usual ones, the latest first.
   , history :: !(IORef [Step])
   -- ^ The latest first.
-  , over :: !(MVar (Maybe (Outcome Void)))
+  , runEnd :: !(MVar (Maybe (Outcome Void)))
   -- ^ How the run ended. Nothing: as the behaviour did. The thread that puts it has no turn
   -- any more.
   , unwinding :: !(IORef Bool)
   -- ^ The run has ended; now its tasks are.
-  , driven :: !(IORef Bool)
+  , driverRuns :: !(IORef Bool)
   -- ^ The driver has the turn, and lends it to one task after the other.
-  , back :: !(MVar ())
+  , driverTurn :: !(MVar ())
   -- ^ The driver gets the turn back.
-  , strikes :: !(IORef Int)
+  , unwindAttempts :: !(IORef Int)
   -- ^ How many operations the task that is being unwound has tried.
-  , attended :: !(IORef Bool)
+  , responded :: !(IORef Bool)
   -- ^ Whether the capability has run what the watchdog put into its queue last.
   }
 
@@ -102,8 +102,8 @@ data Task = Task
   , taskLabel :: !Label
   , taskThread :: !(Maybe ThreadId)
   , gate :: !(MVar ())
-  , place :: !(IORef Place)
-  , raised :: !(IORef (Maybe SomeException))
+  , blockedAt :: !(IORef Position)
+  , pendingException :: !(IORef (Maybe SomeException))
   -- ^ What was thrown to it where it could receive it; it raises that when it has the turn.
   , pending :: !(IORef [Pending])
   -- ^ What was thrown to it where it could not, the newest first.
@@ -111,15 +111,15 @@ data Task = Task
   }
 
 -- | Where a task stands while it does not have the turn.
-data Place
+data Position
   = Unstarted
   | Before !MaskingState !Operation
   | Gone
 
 -- | What a task is about to do, as far as it matters to whether it can.
 data Operation
-  = Free
-  | Transaction (IO Bool) !(IORef Look)
+  = AlwaysEnabled
+  | Transaction (IO Bool) !(IORef EnabledCache)
   | Moment !Seconds
   | -- | A messenger is about to throw.
     Throwing !Task SomeException
@@ -129,7 +129,7 @@ data Operation
 -- | An exception that GHC itself will raise in its target, as soon as that unmasks: a real
 -- thread, on the capability of all tasks, is blocked in a real 'throwTo'.
 data Pending = Pending
-  { helper :: !ThreadId
+  { throwingThread :: !ThreadId
   , thrown :: SomeException
   , released :: !(IORef Bool)
   -- ^ Whether it was raised or withdrawn, or its target has ended.
@@ -139,7 +139,7 @@ data Pending = Pending
 
 -- | Whether a transaction would have run, when so many had been run; and whether it ever
 -- would not have: then its task has begun to wait.
-data Look = Look !Int !Bool !Bool
+data EnabledCache = EnabledCache !Int !Bool !Bool
 
 -- | What unwinds a task when the run has ended.
 data Unwind = Unwind
@@ -171,8 +171,8 @@ newSim o p = do
     <*> newIORef 0
     <*> newIORef 0
     <*> newIORef 0
-    <*> newIORef (min firstAsk turns)
-    <*> newIORef turns
+    <*> newIORef (min firstAsk turnLimit)
+    <*> newIORef turnLimit
     <*> newIORef 0
     <*> newIORef 0
     <*> newIORef []
@@ -185,14 +185,14 @@ newSim o p = do
     <*> newIORef True
 
 -- | For so many points one task may go on in the undisturbed schedule.
-turns :: Int
-turns = 1000
+turnLimit :: Int
+turnLimit = 1000
 
 -- | Ends the run. If somebody else has ended it meanwhile, the turn goes to the driver.
-conclude :: Sim -> Maybe (Outcome Void) -> IO ()
-conclude sim verdict = do
-  first <- tryPutMVar (over sim) verdict
-  unless first (putMVar (back sim) ())
+endRun :: Sim -> Maybe (Outcome Void) -> IO ()
+endRun sim verdict = do
+  first <- tryPutMVar (runEnd sim) verdict
+  unless first (putMVar (driverTurn sim) ())
 
 -- | Each decision has a number of its own.
 tick :: Sim -> IO Int
@@ -209,14 +209,14 @@ committed sim = do
   writeIORef (commits sim) $! n + 1
 
 -- | Puts what the task that has the turn did on record.
-noteStep :: Sim -> StepKind -> IO ()
-noteStep sim what' = do
+recordStep :: Sim -> StepKind -> IO ()
+recordStep sim what' = do
   me <- readIORef (current sim)
   t <- readIORef (time sim)
   n <- readIORef (counter sim)
   modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) (parent me) what' :)
 
 -- | Likewise, if the record is to be detailed.
-detail :: Sim -> StepKind -> IO ()
-detail sim what' = when (detailed (options sim)) (noteStep sim what')
-{-# INLINE detail #-}
+recordDetail :: Sim -> StepKind -> IO ()
+recordDetail sim what' = when (detailed (options sim)) (recordStep sim what')
+{-# INLINE recordDetail #-}

@@ -5,7 +5,7 @@
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Text
-  ( legible
+  ( safeShow
   ) where
 
 import Control.Exception (SomeException, evaluate, throwIO, try)
@@ -15,12 +15,12 @@ import Behavior.Internal.Failure (isCancellation)
 
 -- | The text up to where to compute it throws, which is said then: what describes an
 -- exception must not throw another.
-legible :: String -> String
-legible text = case unsafePerformIO (try (evaluate text) >>= either failing pure) of
+safeShow :: String -> String
+safeShow text = case unsafePerformIO (try (evaluate text) >>= either failing pure) of
   [] -> []
   c : rest -> case unsafePerformIO (try (evaluate c) >>= either (fmap Left . failing) (pure . Right)) of
-    Left instead -> instead
-    Right known -> known : legible rest
+    Left usualOtherwise -> usualOtherwise
+    Right known -> known : safeShow rest
  where
   failing e
     | isCancellation e = throwIO (e :: SomeException)

@@ -10,7 +10,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Turn
   ( choose
-  , waitings
+  , waitingTasks
   ) where
 
 import Control.Monad (void, when)
@@ -20,6 +20,7 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust, isNothing)
 
+import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.OsSleep
@@ -27,48 +28,47 @@ import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Simulator
 
 -- | Who is next. Nobody when the run has ended by this; then the driver has the turn.
 choose :: Sim -> Maybe Task -> IO (Maybe Task)
 choose sim me = do
-  able <- enabled sim
+  enabledTasks <- enabled sim
   n <- readIORef (counter sim)
-  moved <- readIORef (movedAt sim)
+  moved <- readIORef (timeMovedAt sim)
   rotating <- (n >=) <$> readIORef (rotateAt sim)
-  case Map.lookupMin able of
+  case Map.lookupMin enabledTasks of
     Nothing -> timeMoves sim >>= \hope -> if hope then choose sim me else pure Nothing
-    _ | n - moved > livelockLimit (options sim) -> finishing (Livelock (map taskLabel (Map.elems able)))
+    _ | n - moved > livelockLimit (options sim) -> endWith (Livelock (map taskLabel (Map.elems enabledTasks)))
     Just (first, only)
-      | Map.size able == 1 -> run n rotating only
+      | Map.size enabledTasks == 1 -> run n rotating only
       | otherwise -> do
-          let goesOn = Map.member mine able && not rotating
-              usually
+          let goesOn = Map.member mine enabledTasks && not rotating
+              usualChoice
                 | goesOn = mine
-                | otherwise = maybe first fst (Map.lookupGT mine able)
-          decision <- decided sim n usually goesOn able
+                | otherwise = maybe first fst (Map.lookupGT mine enabledTasks)
+          decision <- decided sim n usualChoice goesOn enabledTasks
           case decision of
             Nothing -> pure Nothing
             Just task -> do
-              when (goesOn && not (isMe task)) (detail sim IsPreempted)
+              when (goesOn && not (isMe task)) (recordDetail sim IsPreempted)
               run n rotating task
  where
   mine = maybe (-1) taskNumber me
   isMe task = taskNumber task == mine
-  finishing end = Nothing <$ conclude sim (Just end)
+  endWith end = Nothing <$ endRun sim (Just end)
 
   run n rotating task = do
     unfile sim task
-    when (rotating || not (isMe task)) (writeIORef (rotateAt sim) $! n + turns)
-    ask <- askAt (chooser sim)
+    when (rotating || not (isMe task)) (writeIORef (rotateAt sim) $! n + turnLimit)
+    ask <- askAt (policyOf sim)
     rotate <- readIORef (rotateAt sim)
-    writeIORef (askingAt sim) $! min ask rotate
-    if isJust (taskThread task) then pure (Just task) else carry task
+    writeIORef (nextDecisionAt sim) $! min ask rotate
+    if isJust (taskThread task) then pure (Just task) else throwNow task
 
   -- A messenger only throws; then somebody else is next.
-  carry messenger = do
+  throwNow messenger = do
     modifyIORef' (tasks sim) (IntMap.delete (taskNumber messenger))
-    readIORef (place messenger) >>= \case
+    readIORef (blockedAt messenger) >>= \case
       Before _ (Throwing target e) -> void (throwAt sim Nothing target e)
       _ -> pure ()
     _ <- tick sim
@@ -76,21 +76,21 @@ choose sim me = do
 
 -- | Asks the policy for one of these tasks. Nothing: the run has ended by this.
 decided :: Sim -> Int -> Int -> Bool -> Map Int Task -> IO (Maybe Task)
-decided sim n usually goesOn able = do
+decided sim n usualChoice goesOn enabledTasks = do
   chosen <-
-    decide (chooser sim) $
+    decide (policyOf sim) $
       Decision
         { decisionPoint = n
-        , usual = usually
+        , usual = usualChoice
         , canGoOn = goesOn
-        , candidates = Map.keys able
-        , candidateCount = Map.size able
-        , candidateAt = \k -> fst (Map.elemAt k able)
+        , candidates = Map.keys enabledTasks
+        , candidateCount = Map.size enabledTasks
+        , candidateAt = \k -> fst (Map.elemAt k enabledTasks)
         }
-  case chosen >>= \k -> maybe (Left "no such thread") Right (Map.lookup k able) of
-    Left why -> Nothing <$ conclude sim (Just (ScheduleMismatch why))
+  case chosen >>= \k -> maybe (Left "no such thread") Right (Map.lookup k enabledTasks) of
+    Left why -> Nothing <$ endRun sim (Just (ScheduleMismatch why))
     Right task -> do
-      when (taskNumber task /= usually) (modifyIORef' (taken sim) ((n, taskNumber task) :))
+      when (taskNumber task /= usualChoice) (modifyIORef' (deviations sim) ((n, taskNumber task) :))
       pure (Just task)
 
 -- | No task can do anything: time moves on to when one can, and this is true; or the run
@@ -103,34 +103,34 @@ timeMoves sim = do
     _
       | not (infinite end) -> do
           modifyIORef' (time sim) (max end)
-          finishing OutOfTime
+          endWith OutOfTime
       | otherwise -> do
-          disturbed <- meddled (5 :: Int)
-          who' <- waitings sim (const True)
-          finishing (if disturbed then ExternalWakeup who' else Deadlock who')
+          disturbed <- wokenOutside (5 :: Int)
+          who' <- waitingTasks sim (const True)
+          endWith (if disturbed then ExternalWakeup who' else Deadlock who')
  where
   end = endAt (options sim)
   infinite (Seconds s) = isInfinite s
-  finishing how = False <$ conclude sim (Just how)
+  endWith how = False <$ endRun sim (Just how)
   moveTo t = do
     writeIORef (time sim) $! t
-    readIORef (counter sim) >>= writeIORef (movedAt sim)
+    readIORef (counter sim) >>= writeIORef (timeMovedAt sim)
     True <$ wakeUntil sim t
 
   -- Nothing in the simulation can wake anybody. Something outside might just have: a
   -- thread of the user's own.
-  meddled 0 = pure False
-  meddled n = do
+  wokenOutside 0 = pure False
+  wokenOutside n = do
     committed sim
-    able <- enabled sim
-    if Map.null able then osSleep 1000 >> meddled (n - 1) else pure True
+    enabledTasks <- enabled sim
+    if Map.null enabledTasks then osSleep 1000 >> wokenOutside (n - 1) else pure True
 
   -- How far it moves: to the next moment at which a sleeper is due, or to a later one, as
   -- long as none is late by 'slip'.
   later asleep next = case (Map.toAscList within, Map.lookupMin within) of
-    (_ : _ : _, Just (usually, _)) -> do
+    (_ : _ : _, Just (usualChoice, _)) -> do
       n <- readIORef (counter sim)
-      chosen <- decided sim n usually False (snd <$> within)
+      chosen <- decided sim n usualChoice False (snd <$> within)
       _ <- tick sim
       pure (chosen >>= \task -> fst <$> Map.lookup (taskNumber task) within)
     _ -> pure (Just next)
@@ -144,10 +144,10 @@ timeMoves sim = do
       | otherwise = []
 
 -- | Who of these tasks waits for what.
-waitings :: Sim -> (Task -> Bool) -> IO [Waiting]
-waitings sim these = do
+waitingTasks :: Sim -> (Task -> Bool) -> IO [Waiting]
+waitingTasks sim these = do
   alive <- IntMap.elems <$> readIORef (tasks sim)
-  waiting <- traverse (\task -> Waiting (taskLabel task) . reason alive task <$> readIORef (place task)) (filter these alive)
+  waiting <- traverse (\task -> Waiting (taskLabel task) . reason alive task <$> readIORef (blockedAt task)) (filter these alive)
   (waiting ++) . concat <$> traverse sent alive
  where
   sent target = do

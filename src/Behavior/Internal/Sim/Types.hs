@@ -22,8 +22,8 @@ module Behavior.Internal.Sim.Types
 
 import Control.Exception (SomeException)
 
+import Behavior.Internal.Runtime.Backend (Label)
 import Behavior.Internal.Seconds (Seconds)
-import Behavior.Internal.Simulator (Label)
 
 -- | How to simulate.
 --

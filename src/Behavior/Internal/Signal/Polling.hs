@@ -5,7 +5,7 @@
 -- Sensors that must be asked.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Sensor
+module Behavior.Internal.Signal.Polling
   ( polling
   , staleAfter
   ) where
@@ -18,7 +18,7 @@ import Data.IORef (newIORef, readIORef, writeIORef)
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Seconds (period)
-import Behavior.Internal.Source
+import Behavior.Internal.Signal.Source
 
 -- $setup
 -- >>> import Behavior
@@ -67,16 +67,16 @@ polling every act = Signal $ \demand -> do
           writeIORef next $! slot + every
           when (readingTimes demand) $ atomically (writeTVar inFlight (Just slot))
           generation <- readTVarIO views
-          (read', stopping) <- mask $ \restore -> do
+          (read', stopWanted) <- mask $ \restore -> do
             read' <- trySynchronous (restore act)
             -- The stop request, if there is one, stays pending until what went wrong has
             -- been thrown.
-            stopping <- stopRequested
+            stopWanted <- stopRequested
             -- The reading is not wanted any more, and may have swallowed the stop request.
             -- A fault of its cleanup is not lost.
-            when stopping (either throwIO (const (pure ())) read')
-            pure (read', stopping)
-          unless stopping $ do
+            when stopWanted (either throwIO (const (pure ())) read')
+            pure (read', stopWanted)
+          unless stopWanted $ do
             changed <- case (published, read') of
               -- (A view that was asked for meanwhile waits for this reading, whatever it is.)
               (Published generation' old, Right new) | generation == generation' -> differs old new
@@ -88,7 +88,7 @@ polling every act = Signal $ \demand -> do
               _ | not changed -> published
               Left _ -> Unpublished
               Right new -> Published generation new
-      differs old new = either (const True) not <$> trySynchronous (evaluate (sameFor demand old new))
+      differs old new = either (const True) not <$> trySynchronous (evaluate (equalFor demand old new))
       -- The slot, or if that has been missed the next one.
       slotAfter t slot
         | slot >= t = slot
@@ -99,7 +99,7 @@ polling every act = Signal $ \demand -> do
       , view = do
           n <- (+ 1) <$> readTVar views
           writeTVar views n
-          pure . always $
+          pure . constantView $
             readTVar newest >>= \case
               Just (generation, read') | generation >= n -> either throwSTM pure read'
               _ -> retry
@@ -138,15 +138,15 @@ staleAfter limit signal = Signal $ \demand -> do
         when isOverdue . atomically $ do
           still <- (== Just since) <$> inFlightSince source
           when still retry
-          calm
-      calm = modifyTVar' overdue (\n -> if odd n then n + 1 else n)
-      inTime before value = do
+          clearOverdue
+      clearOverdue = modifyTVar' overdue (\n -> if odd n then n + 1 else n)
+      orTooLate before value = do
         n <- readTVar overdue
         when (odd n || n > before) . failWith $
           "no reading of the signal within " ++ show limit ++ " s"
         value
   pure
     source
-      { workers = Worker "staleAfter" (const watchdog <$ calm) : workers source
-      , view = looking . inTime <$> readTVar overdue <*> view source
+      { workers = Worker "staleAfter" (const watchdog <$ clearOverdue) : workers source
+      , view = mapView . orTooLate <$> readTVar overdue <*> view source
       }

@@ -2,9 +2,9 @@
 
 -- |
 -- What can happen to an action of the robot.
-module Event
-  ( Event (..)
-  , Happening (..)
+module WorldChange
+  ( WorldChange (..)
+  , ChangeKind (..)
   , describe
   , line
   ) where
@@ -14,17 +14,17 @@ import Numeric (showFFloat)
 import Battery (wholePercent)
 import Behavior (Seconds)
 
-data Event = Event
+data WorldChange = WorldChange
   { time :: Seconds
   -- ^ Since the world began.
   , charge :: Double
   -- ^ Of the battery, percent.
   , action :: String
-  , happening :: Happening
+  , changeKind :: ChangeKind
   }
   deriving (Eq, Show)
 
-data Happening
+data ChangeKind
   = Begins
   | Done
   | -- | It could not be done, for this reason.
@@ -36,8 +36,8 @@ data Happening
   deriving (Eq, Show)
 
 -- | An event as one line of a report.
-describe :: Event -> String
-describe event = line (time event) (charge event) (action event ++ ending (happening event))
+describe :: WorldChange -> String
+describe event = line (time event) (charge event) (action event ++ ending (changeKind event))
  where
   ending = \case
     Begins -> " ..."

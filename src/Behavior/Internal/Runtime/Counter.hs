@@ -5,7 +5,7 @@
 -- one takes a single instruction.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Counter
+module Behavior.Internal.Runtime.Counter
   ( Counter
   , add
   , total

@@ -15,7 +15,7 @@
 -- clock, but nobody who keeps it: there nothing wakes.)
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Alarm
+module Behavior.Internal.Runtime.TimerWheel
   ( sleepBetween
   , sleepToSlot
   , slotTime

@@ -3,7 +3,7 @@
 -- |
 -- 'Signal.polling': which readings an operator hears of. One that is like the last one
 -- wakes nobody; and apart from that nobody can tell.
-module Behavior.NewsSpec (spec) where
+module Behavior.EqualitySuppressionSpec (spec) where
 
 import Control.Concurrent (myThreadId)
 import Control.Concurrent.Async (asyncThreadId)
@@ -71,7 +71,7 @@ unheard = do
         awoken `shouldReturn` before
 
   it "is heard by who asks for one: after a switch it decides" $ do
-    book <- newNotebook
+    book <- newLog
     let branch isOver = now >>= note book . (,) isOver >> if isOver then pure () else hang
     minute (Signal.switch ((>= 5) <$> time) branch) `shouldReturn` ("over", 6)
     notes book `shouldReturn` [(False, 0), (True, 6)]
@@ -84,7 +84,7 @@ unheard = do
         `shouldReturn` ("over", decided)
 
   it "decides after a recovery" $ do
-    book <- newNotebook
+    book <- newLog
     let recovery = now >>= note book >> sleep 3
     _ <- minute (Signal.monitor ((\t -> t >= 5 && t < 10) <$> time) recovery hang)
     notes book `shouldReturn` [5, 8]
@@ -93,7 +93,7 @@ heard :: Spec
 heard = do
   for_ operators $ \op ->
     it ("wakes " ++ show op ++ " at once") $ do
-      book <- newNotebook
+      book <- newLog
       let main = hang `onException` (now >>= note book)
       _ <- minute (running op ((\t -> t < 5 || t >= 6) <$> time) main (pure "other"))
       take 1 <$> notes book `shouldReturn` [5]
@@ -127,7 +127,7 @@ unnoticed = do
   prop "of one with hysteresis" $ sameAsUnheard (fmap fromEnum . Signal.hysteresis False 3 6)
 
   it "two operators on a shared signal each hear of what is news to them" $ do
-    book <- newNotebook
+    book <- newLog
     let following n s = Signal.switch ((`div` n) . floor <$> s) $ \k ->
           now >>= \t -> note book (n, k, t) >> hang
         body s = sleep 0.5 >> both (following 2 s) (following (3 :: Int) s) :: Behavior ()
@@ -145,7 +145,7 @@ sameAsUnheard refined =
       let level = (\t -> cycle levels !! floor t) <$> now
           coarse = (`div` coarseness) <$> refined (Signal.polling 1 level)
           course signal = do
-            book <- newNotebook
+            book <- newLog
             _ <- minute (Signal.switch signal (\k -> now >>= note book . (,) k >> hang))
             notes book
       (===) <$> course coarse <*> course (const <$> coarse <*> pure ())

@@ -2,7 +2,7 @@
 
 -- |
 -- Signals made more exact: 'Signal.hysteresis' and 'Signal.debounce'.
-module Behavior.RefinedSpec (spec) where
+module Behavior.FilterSpec (spec) where
 
 import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
@@ -27,11 +27,11 @@ spec = guarded $ do
   describe "debounce" debounce
   for_ [("hysteresis", Signal.hysteresis False False True), ("debounce", Signal.debounce 1)] $ \(name, refined) ->
     it (name ++ " goes on after what its signal throws while no operator reads it") $ do
-      book <- newNotebook
-      dial <- newDial True
-      _ <- simulate . Signal.withShared (refined (watched dial)) $ \signal -> do
+      book <- newLog
+      condition <- newTestCondition True
+      _ <- simulate . Signal.withShared (refined (watched condition)) $ \signal -> do
         Signal.switch signal (note book)
-        for_ [SaysFault, Says False] $ \says' -> atomically (writeTVar dial says') >> sleep 2
+        for_ [SaysFault, Says False] $ \says' -> atomically (writeTVar condition says') >> sleep 2
         Signal.switch signal (note book)
       notes book `shouldReturn` [True, False]
 
@@ -52,7 +52,7 @@ hysteresis = do
   prop "is a fold over the values that were seen" $
     forAll ((,) <$> thresholds <*> listOf1 (choose (0, 10))) $ \((low, high), levels) ->
       ioProperty $ do
-        book <- newNotebook
+        book <- newLog
         position <- newTVarIO (0 :: Int)
         let level = (levels !!) <$> dialled position
             signal = (,) <$> dialled position <*> Signal.hysteresis False low high level
@@ -78,7 +78,7 @@ hysteresis = do
 
   for_ [("rose", False, 0, 95), ("fell", True, 95, 0)] $ \(manner, initial, start, changed) ->
     it ("remembers also what " ++ manner ++ " and changed nothing for its operator") $ do
-      book <- newNotebook
+      book <- newLog
       level <- newRecorded (start :: Int)
       armed <- newTVarIO False
       entered <- newGate
@@ -97,7 +97,7 @@ hysteresis = do
       notes book `shouldReturn` ["task", "recovery", "task"]
 
   it "keeps its memory across recoveries" $ do
-    book <- newNotebook
+    book <- newLog
     level <- newTVarIO (95 :: Int)
     let cool = do
           note book =<< readTVarIO level
@@ -111,7 +111,7 @@ hysteresis = do
         `shouldReturn` "left"
 
   it "refuses thresholds the wrong way round, and nothing starts" $ do
-    book <- newNotebook
+    book <- newLog
     let signal = Signal.hysteresis False 2 1 (Signal.polling 0.001 ((1 :: Int) <$ note book "reading"))
     ending (Signal.rSelect signal (note book "left") (note book "right"))
       `shouldReturn` FaultedWith "hysteresis: the lower threshold must be at most the upper one"
@@ -138,13 +138,13 @@ debounce = do
       Signal.switch (Signal.debounce (1 / 0) once) pure `shouldReturn` 1
 
   it "counts a change once it has lasted for so long, and no sooner" $ do
-    dial <- newDial True
+    condition <- newTestCondition True
     entered <- newGate
-    launching (Signal.rSelect (Signal.debounce 0.005 (watched dial)) (open entered >> hang) now) $
+    launching (Signal.rSelect (Signal.debounce 0.005 (watched condition)) (open entered >> hang) now) $
       \caller -> do
         pass entered
         since <- now
-        set dial (Says False)
+        set condition (Says False)
         Gave over <- awaitEnd caller
         over - since `shouldSatisfy` (>= 0.005)
 
@@ -156,13 +156,13 @@ debounce = do
       phases `shouldSatisfy` any (\(v, from, to) -> v == value && min to counted - from >= 0.002)
 
   it "counts at once the first value after a recovery" $ do
-    dial <- newDial True
-    Signal.monitor (Signal.debounce (1 / 0) (watched dial)) (set dial (Says False)) (pure "task")
+    condition <- newTestCondition True
+    Signal.monitor (Signal.debounce (1 / 0) (watched condition)) (set condition (Says False)) (pure "task")
       `shouldReturn` "task"
 
   it "counts at once the first value after a recovery, and not the one before, under any schedule" $
     void . explore (randomly 200) $ \simulated -> do
-      book <- newNotebook
+      book <- newLog
       level <- newTVarIO True
       let recovery = note book "recovery" >> atomically (writeTVar level False)
       run <- simulated (Signal.monitor (Signal.debounce 1 (dialled level)) recovery (note book "task"))
@@ -170,7 +170,7 @@ debounce = do
       notes book `shouldReturn` ["recovery", "task"]
 
   it "forgets at a recovery a change that had not lasted" $ do
-    book <- newNotebook
+    book <- newLog
     alarm <- newTVarIO False
     level <- newTVarIO False
     let recovery = note book "recovery" >> atomically (writeTVar alarm False >> writeTVar level False)
@@ -188,15 +188,15 @@ debounce = do
     finished run `shouldBe` 2.75
 
   it "of no duration follows its signal" $ do
-    dial <- newDial True
-    let left = set dial (Says False) >> hang
-    Signal.rSelect (Signal.debounce 0 (watched dial)) left (pure "right") `shouldReturn` "right"
+    condition <- newTestCondition True
+    let left = set condition (Says False) >> hang
+    Signal.rSelect (Signal.debounce 0 (watched condition)) left (pure "right") `shouldReturn` "right"
 
   for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
     it ("does not wait, when its signal " ++ show news) $ do
-      dial <- newDial True
-      let left = set dial news >> hang
-      ending (Signal.rSelect (Signal.debounce (1 / 0) (watched dial)) left (pure ()))
+      condition <- newTestCondition True
+      let left = set condition news >> hang
+      ending (Signal.rSelect (Signal.debounce (1 / 0) (watched condition)) left (pure ()))
         `shouldReturn` case news of
           SaysFailure -> FailedWith "FailedBecause \"the sensor\""
           SaysFault -> FaultedWith (show (Fault "the sensor"))
@@ -204,7 +204,7 @@ debounce = do
 
   for_ [(-1, "-1.0"), (0 / 0, "NaN")] $ \(seconds, shown) ->
     it ("refuses a duration of " ++ shown ++ ", and nothing starts") $ do
-      book <- newNotebook
+      book <- newLog
       let signal = Signal.debounce seconds (Signal.polling 0.001 (True <$ note book "reading"))
       ending (Signal.rSelect signal (note book "left") (note book "right"))
         `shouldReturn` FaultedWith ("debounce: a duration is zero or more seconds, not " ++ shown)

@@ -3,7 +3,7 @@
 --
 -- Real time passes in here, but little of it; what is said of it are lower bounds, and that
 -- it ends.
-module Behavior.AlarmSpec (spec) where
+module Behavior.TimerWheelSpec (spec) where
 
 import Control.Concurrent (myThreadId, yield)
 import Control.Concurrent.Async
@@ -17,7 +17,7 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
 import Test.QuickCheck hiding (within)
 
-import Behavior.Internal.Alarm
+import Behavior.Internal.Runtime.TimerWheel
 import Memory
 import Support
 
@@ -147,7 +147,7 @@ sleepers = do
 
   for_ [0, -1, -1 / 0] $ \seconds ->
     it ("for " ++ show seconds ++ " s does not wait: nothing can come in between") $ do
-      book <- newNotebook
+      book <- newLog
       let act = mask_ $ do
             self <- myThreadId
             throwing self (Cancel "the sleeper")

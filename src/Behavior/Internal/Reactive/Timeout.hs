@@ -5,7 +5,7 @@
 -- Limits of time.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Time
+module Behavior.Internal.Reactive.Timeout
   ( timeout
   , TimedOut (..)
   ) where
@@ -18,10 +18,10 @@ import Behavior.Internal.Failure
   , behaviorFailedFromException
   , behaviorFailedToException
   )
-import Behavior.Internal.Reactive (Reaction (..), react)
+import Behavior.Internal.Reactive.Engine (Reaction (..), react)
 import Behavior.Internal.Runtime (atomically, now, sleepUntil)
 import Behavior.Internal.Seconds (Seconds, duration)
-import Behavior.Internal.Source (Signal (..), Source (..), Worker (..), always, viewing)
+import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), constantView, fromView)
 
 -- $setup
 -- >>> import Behavior (sleep, (?))
@@ -72,4 +72,4 @@ elapsed seconds = Signal $ \_ -> do
   over <- newTVarIO (seconds <= 0)
   deadline <- (+ seconds) <$> now
   let clock = sleepUntil deadline >> atomically (writeTVar over True)
-  pure (viewing (pure (always (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]}
+  pure (fromView (pure (constantView (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]}

@@ -5,7 +5,7 @@
 -- Signals that do not follow every flicker.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Filter
+module Behavior.Internal.Signal.Filter
   ( debounce
   , hysteresis
   ) where
@@ -16,7 +16,7 @@ import Control.Monad (forever, unless, when)
 
 import Behavior.Internal.Runtime
 import Behavior.Internal.Seconds (duration)
-import Behavior.Internal.Source
+import Behavior.Internal.Signal.Source
 
 -- $setup
 -- >>> import Behavior
@@ -35,7 +35,7 @@ debounce seconds signal = Signal $ \demand -> do
   source <- open (suppressEqual signal) demand
   settled <- newTVarIO Nothing
   pending <- newTVarIO Nothing -- a value that differs, and since when
-  let noticing value = do
+  let trackChanges value = do
         first <- atomically value
         atomically (writeTVar settled (Just first))
         let next old = do
@@ -46,22 +46,22 @@ debounce seconds signal = Signal $ \demand -> do
                 writeTVar pending (if isSettled then Nothing else Just (new, t))
               next new
         next first
-      settling = forever $ do
+      promoteAfterDelay = forever $ do
         candidate@(new, since) <- atomically (readTVar pending >>= maybe retry pure)
         sleepUntil (since + seconds)
         atomically $ do
           lasted <- (== Just candidate) <$> readTVar pending
           when lasted (writeTVar settled (Just new) >> writeTVar pending Nothing)
-      forgetAll = writeTVar settled Nothing >> writeTVar pending Nothing
+      reset = writeTVar settled Nothing >> writeTVar pending Nothing
   pure
     source
       { workers =
           workers source
-            ++ [ Worker "debounce" (forgetAll >> const . noticing . quietly <$> view source)
-               , Worker "debounce clock" (pure (const settling))
+            ++ [ Worker "debounce" (reset >> const . trackChanges . ignoreErrors <$> view source)
+               , Worker "debounce clock" (pure (const promoteAfterDelay))
                ]
       , -- The look at the source itself is for what it throws.
-        view = looking (*> (readTVar settled >>= maybe retry pure)) <$> view source
+        view = mapView (*> (readTVar settled >>= maybe retry pure)) <$> view source
       }
 
 -- | A Schmitt trigger: @hysteresis initial low high signal@ becomes true when the signal
@@ -84,7 +84,7 @@ hysteresis :: Ord a => Bool -> a -> a -> Signal a -> Signal Bool
 hysteresis initial low high signal = Signal $ \demand -> do
   unless (low <= high) . throwIO . ErrorCall $
     "hysteresis: the lower threshold must be at most the upper one"
-  source <- open (suppressEqual signal) anything {readingTimes = readingTimes demand}
+  source <- open (suppressEqual signal) everyValue {readingTimes = readingTimes demand}
   memory <- newTVarIO initial
   let state value = do
         v <- value
@@ -95,17 +95,17 @@ hysteresis initial low high signal = Signal $ \demand -> do
       -- What a look finds out is remembered if the operator acts on it, in the same
       -- transaction, and is undone if the operator goes on waiting. Then this
       -- remembers it.
-      remembering value = forever . atomically $ do
+      remember value = forever . atomically $ do
         before <- readTVar memory
         after <- state value
         check (after /= before)
   pure
     source
-      { workers = workers source ++ [Worker "hysteresis" (const . remembering . quietly <$> view source)]
-      , view = looking state <$> view source
+      { workers = workers source ++ [Worker "hysteresis" (const . remember . ignoreErrors <$> view source)]
+      , view = mapView state <$> view source
       }
 
 -- | A look for those who wait for values only: what it throws is for the operator,
 -- which looks for itself.
-quietly :: View a -> STM a
-quietly v = firstRead v `catchSTM` \(_ :: SomeException) -> retry
+ignoreErrors :: View a -> STM a
+ignoreErrors v = firstRead v `catchSTM` \(_ :: SomeException) -> retry

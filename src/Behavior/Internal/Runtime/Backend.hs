@@ -5,7 +5,7 @@
 -- What the two sides of the seam speak of, and what a simulation does for its threads.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Simulator
+module Behavior.Internal.Runtime.Backend
   ( Label (..)
   , Event (..)
   , Simulator (..)
@@ -33,7 +33,7 @@ data Event
   = Started Label
   | Ended Label
   | -- | What a behaviour says of itself.
-    Noted String
+    Annotated String
   deriving (Eq, Ord, Show)
 
 -- | How a simulation does what its threads ask of the seam.

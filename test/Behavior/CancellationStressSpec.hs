@@ -7,7 +7,7 @@
 -- The moment is a random number of 'yield's after the start. A storm proves nothing
 -- about a schedule that it does not hit; but whichever it hits, what is checked here
 -- must hold, so no example can fail by bad luck.
-module Behavior.StormSpec (spec) where
+module Behavior.CancellationStressSpec (spec) where
 
 import Control.Concurrent
 import Control.Concurrent.Async (asyncThreadId)
@@ -44,9 +44,9 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
     property . withMaxSuccess 2000 $ \tree (Moments moments) ->
       ioProperty $ do
         inside <- newIORef (0 :: Int)
-        weather <- newTVarIO (0 :: Int)
-        let change = atomically (modifyTVar' weather (+ 1))
-        end <- stormingWith change moments (leavingNothing (grow inside weather tree))
+        input <- newTVarIO (0 :: Int)
+        let change = atomically (modifyTVar' input (+ 1))
+        end <- stormingWith change moments (leavingNothing (grow inside input tree))
         left <- readIORef inside
         pure (tabulate "it ended" [kindOf end] (left === 0))
 
@@ -88,7 +88,7 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
     property . withMaxSuccess 1000 $ \(NonNegative n) (Moments moments) ->
       ioProperty $ do
         (end, done) <- do
-          notebook <- newNotebook
+          notebook <- newLog
           let first = replicateM_ n yield >> note notebook 'f' >> failed
           e <- storming moments (first ? note notebook 's')
           (,) e <$> notes notebook
@@ -230,7 +230,7 @@ instance Arbitrary Tree where
       several = choose (1, 3) >>= \k -> vectorOf k (tree (n `div` 3))
 
 grow :: IORef Int -> TVar Int -> Tree -> IO ()
-grow inside weather = go
+grow inside input = go
  where
   go = \case
     Bottom leaf -> perform inside leaf
@@ -245,7 +245,7 @@ grow inside weather = go
       children <- traverse (fork nursery . go) as
       go a >> traverse_ requestStop children >> go b
     Within s a -> timeout (realToFrac s) (go a)
-    Select a b -> Signal.rSelect ((== 0) . (`mod` 2) <$> sky) (go a) (go b)
-    Guard a b -> Signal.monitor ((== 0) . (`mod` 3) <$> sky) (go a) (go b)
-    Switching a b -> Signal.switch sky (\n -> if even n then go a else go b)
-  sky = Signal.watching (readTVar weather)
+    Select a b -> Signal.rSelect ((== 0) . (`mod` 2) <$> inputSignal) (go a) (go b)
+    Guard a b -> Signal.monitor ((== 0) . (`mod` 3) <$> inputSignal) (go a) (go b)
+    Switching a b -> Signal.switch inputSignal (\n -> if even n then go a else go b)
+  inputSignal = Signal.watching (readTVar input)

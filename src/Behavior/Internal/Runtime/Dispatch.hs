@@ -9,7 +9,7 @@
 -- While none runs, the switch costs one look at a number.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Seam
+module Behavior.Internal.Runtime.Dispatch
   ( inSimulation
   , simulator
   , withBackend
@@ -20,8 +20,8 @@ import Control.Exception (bracket_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
 import System.IO.Unsafe (unsafePerformIO)
 
-import Behavior.Internal.Counter
-import Behavior.Internal.Simulator
+import Behavior.Internal.Runtime.Backend
+import Behavior.Internal.Runtime.Counter
 
 -- | The simulations that run in this process. They do not know of each other.
 simulators :: IORef [(Int, Simulator)]

@@ -5,40 +5,38 @@
 -- What a signal is made of.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Source
+module Behavior.Internal.Signal.Source
   ( -- * Signals
     Signal (..)
   , watching
-  , withShared
 
     -- * Opening
   , Demand (..)
-  , anything
-  , on
+  , everyValue
+  , contramapDemand
   , suppressEqual
 
     -- * Sources
   , Source (..)
-  , viewing
+  , fromView
   , View (..)
-  , Look (..)
-  , lookAt
-  , always
-  , looking
+  , ReadMode (..)
+  , readView
+  , constantView
+  , mapView
 
     -- * What must run for them
   , Worker (..)
   , Sensors
   , startSensors
-  , diedOf
+  , sensorError
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (ErrorCall (..), SomeException, finally)
-import Control.Monad (when)
+import Control.Exception (SomeException)
 import Data.Traversable (for)
 
-import Behavior.Internal.Failure (Behavior, failWith)
+import Behavior.Internal.Failure (failWith)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
 
@@ -63,16 +61,16 @@ import Behavior.Internal.Scope
 newtype Signal a = Signal {open :: Demand a -> IO (Source a)}
 
 instance Functor Signal where
-  fmap f signal = Signal $ \demand -> fmap f <$> open signal (demand `on` f)
+  fmap f signal = Signal $ \demand -> fmap f <$> open signal (demand `contramapDemand` f)
 
 instance Applicative Signal where
   pure a = Signal (\_ -> pure (pure a))
   f <*> a = Signal $ \demand ->
-    (<*>) <$> open f anything {readingTimes = readingTimes demand} <*> open a anything {readingTimes = readingTimes demand}
+    (<*>) <$> open f everyValue {readingTimes = readingTimes demand} <*> open a everyValue {readingTimes = readingTimes demand}
 
 -- | What a consumer needs of a source.
 data Demand a = Demand
-  { sameFor :: a -> a -> Bool
+  { equalFor :: a -> a -> Bool
   -- ^ Which values it need not tell apart: a reading that is the same as the one before may
   -- be suppressed.
   , readingTimes :: Bool
@@ -80,16 +78,16 @@ data Demand a = Demand
   }
 
 -- | To be given every value, and nothing else.
-anything :: Demand a
-anything = Demand {sameFor = \_ _ -> False, readingTimes = False}
+everyValue :: Demand a
+everyValue = Demand {equalFor = \_ _ -> False, readingTimes = False}
 
 -- | The demand that a consumer of the function's results has on its arguments.
-on :: Demand b -> (a -> b) -> Demand a
-on demand f = demand {sameFor = \a b -> sameFor demand (f a) (f b)}
+contramapDemand :: Demand b -> (a -> b) -> Demand a
+contramapDemand demand f = demand {equalFor = \a b -> equalFor demand (f a) (f b)}
 
 -- | The signal with equal consecutive values suppressed, where that saves something.
 suppressEqual :: Eq a => Signal a -> Signal a
-suppressEqual signal = Signal $ \demand -> open signal demand {sameFor = (==)}
+suppressEqual signal = Signal $ \demand -> open signal demand {equalFor = (==)}
 
 -- | A signal that was opened, for one run of an operator.
 data Source a = Source
@@ -102,14 +100,14 @@ data Source a = Source
   }
 
 -- | The source that gives this view, and needs no worker.
-viewing :: STM (View a) -> Source a
-viewing it = Source {workers = [], view = it, inFlightSince = pure Nothing}
+fromView :: STM (View a) -> Source a
+fromView it = Source {workers = [], view = it, inFlightSince = pure Nothing}
 
 instance Functor Source where
   fmap f source = source {view = fmap f <$> view source}
 
 instance Applicative Source where
-  pure = viewing . pure . pure
+  pure = fromView . pure . pure
   f <*> a =
     Source
       { workers = workers f ++ workers a
@@ -130,34 +128,34 @@ data View a = View
   }
 
 instance Functor View where
-  fmap f = looking (fmap f)
+  fmap f = mapView (fmap f)
 
 instance Applicative View where
-  pure = always . pure
+  pure = constantView . pure
   View f f' <*> View a a' = View (f <*> a) (f' <*> a')
 
 -- | Whether the operator has had a value before.
-data Look = FirstRead | Reread
+data ReadMode = FirstRead | Reread
 
 -- | The value, looked at in that way.
-lookAt :: Look -> View a -> STM a
-lookAt FirstRead = firstRead
-lookAt Reread = reread
+readView :: ReadMode -> View a -> STM a
+readView FirstRead = firstRead
+readView Reread = reread
 
 -- | To look the same way each time.
-always :: STM a -> View a
-always value = View value value
+constantView :: STM a -> View a
+constantView value = View value value
 
 -- | The view, looked at in another way.
-looking :: (STM a -> STM b) -> View a -> View b
-looking f (View a a') = View (f a) (f a')
-{-# INLINE looking #-}
+mapView :: (STM a -> STM b) -> View a -> View b
+mapView f (View a a') = View (f a) (f a')
+{-# INLINE mapView #-}
 
 -- | A thread that a source needs while it is looked at. It runs until its stop is requested,
 -- and can see whether it was. It may be started again after a pause.
 data Worker = Worker
   { workerName :: String
-  , prepared :: STM (IO Bool -> IO ())
+  , prepare :: STM (IO Bool -> IO ())
   -- ^ Prepares one start, and gives what is then to run.
   }
 
@@ -174,50 +172,9 @@ data Worker = Worker
 --
 -- @since 0.1.0.0
 watching :: STM a -> Signal a
-watching transaction = Signal . const . pure . viewing . pure $ View transaction (transaction `orElse` noneAnyMore)
+watching transaction = Signal . const . pure . fromView . pure $ View transaction (transaction `orElse` noValueAnyMore)
  where
-  noneAnyMore = failWith "the signal has no value any more"
-
--- | Opens the sources of a signal once, for all its occurrences in a behaviour.
---
--- > withShared s body  ~  body s     but with one thread a sensor, not one an occurrence
---
--- The sensors are read for as long as the behaviour runs, and are asked to stop
--- together with it: a cleanup must not wait for them. An operator in there decides on a
--- reading that began after the operator did, and so waits for the next slot, up to a period.
--- All that the behaviour throws is thrown. Outside it the shared signal is closed: to open
--- it there is a fault, an 'ErrorCall'.
---
--- >>> import Data.IORef
--- >>> count <- newIORef (0 :: Int)
--- >>> let sensor = Signal.polling 0.001 (atomicModifyIORef' count (\n -> (n + 1, n)))
--- >>> Signal.withShared sensor $ \s -> Signal.rSelect ((==) <$> s <*> s) (pure "one sensor") (pure "two sensors")
--- "one sensor"
---
--- @since 0.1.0.0
-withShared :: Signal a -> (Signal a -> Behavior b) -> Behavior b
-withShared signal body = do
-  -- (A consumer that looks at the times of readings may come later.)
-  source <- open signal anything {readingTimes = True}
-  closed <- newTVarIO False
-  -- It closes only when all have ended: some of those that are still stopping may be looking
-  -- just then.
-  structured (sharing source closed) `finally` atomically (writeTVar closed True)
- where
-  sharing source closed scope = do
-    sensors <- newEmptyTMVarIO
-    let shared = Signal $ \_ -> do
-          atomically stillOpen
-          running <- atomically (readTMVar sensors)
-          let attended value = stillOpen >> diedOf running >>= maybe value throwSTM
-          pure source {workers = [], view = looking attended <$> view source}
-        stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
-    -- The body comes first, so that its fault is the leftmost.
-    main <- branch scope (Label "withShared" "body") (body shared)
-    (_, running) <- startSensors scope "withShared" source
-    atomically (putTMVar sensors running)
-    outcomeToIO <$> atomically (outcome main)
-  closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"
+  noValueAnyMore = failWith "the signal has no value any more"
 
 -- | The threads that run for a source, from left to right.
 type Sensors = [Branch ()]
@@ -229,14 +186,14 @@ startSensors :: Scope -> String -> Source a -> IO (View a, Sensors)
 startSensors scope operator source = case workers source of
   [] -> (\seen -> (seen, [])) <$> atomically (view source)
   needed -> do
-    (runs, seen) <- atomically ((,) <$> traverse prepared needed <*> view source)
+    (runs, seen) <- atomically ((,) <$> traverse prepare needed <*> view source)
     running <- for (zip needed runs) $ \(w, run) -> worker scope (Label operator (workerName w)) run
     (seen, running) <$ yieldReal
 
 -- | What one of them has died of, if it has, the leftmost first. (One whose stop was
 -- requested has not.)
-diedOf :: Sensors -> STM (Maybe SomeException)
-diedOf = foldr orDied (pure Nothing)
+sensorError :: Sensors -> STM (Maybe SomeException)
+sensorError = foldr orDied (pure Nothing)
  where
   orDied sensor others = tryReadOutcomeSTM sensor >>= maybe others (pure . Just) . (>>= cause)
   cause = \case

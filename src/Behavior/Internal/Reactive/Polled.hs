@@ -1,20 +1,20 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The paper's reactive operators: those of "Behavior.Internal.Reactive", on a
+-- The paper's reactive operators: those of "Behavior.Internal.Reactive.Operators", on a
 -- condition that is polled.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Polled
+module Behavior.Internal.Reactive.Polled
   ( rSelect
   , monitor
   , defaultPeriod
   ) where
 
 import Behavior.Internal.Failure (Behavior)
-import qualified Behavior.Internal.Reactive as Signal
+import qualified Behavior.Internal.Reactive.Operators as Signal
 import Behavior.Internal.Runtime (Seconds)
-import qualified Behavior.Internal.Sensor as Signal
+import qualified Behavior.Internal.Signal.Polling as Signal
 
 -- | A reactive @if@: reads @test@ again and again, runs @left@ while it is true and
 -- @right@ while it is false, and switches whenever it changes.

@@ -1,0 +1,47 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- One variable in which several branches publish, and the leftmost of them counts. So to wait
+-- for the first of n branches is to read one variable, and not n.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Leftmost
+  ( Leftmost
+  , newLeftmost
+  , publish
+  , publishFailure
+  , readLeftmost
+  , tryReadLeftmost
+  ) where
+
+import Control.Concurrent.STM
+import Control.Exception (SomeException)
+
+import Behavior.Internal.Scope (Outcome, result)
+
+-- | What the leftmost branch that has published anything published, and the branch's number.
+newtype Leftmost x = Leftmost (TVar (Maybe (Int, x)))
+
+-- | Nothing is published yet.
+newLeftmost :: IO (Leftmost x)
+newLeftmost = Leftmost <$> newTVarIO Nothing
+
+-- | Publishes, unless a branch further left has.
+publish :: Leftmost x -> Int -> x -> STM ()
+publish (Leftmost variable) n x =
+  readTVar variable >>= \case
+    Just (m, _) | m < n -> pure ()
+    _ -> writeTVar variable (Just (n, x))
+
+-- | Publishes what a branch threw, if it threw anything.
+publishFailure :: Leftmost SomeException -> Int -> Outcome a -> STM ()
+publishFailure leftmost n = either (publish leftmost n) (\_ -> pure ()) . result
+
+-- | What was published; retries until something was.
+readLeftmost :: Leftmost x -> STM x
+readLeftmost (Leftmost variable) = readTVar variable >>= maybe retry (pure . snd)
+
+-- | What was published, if anything was. Does not block.
+tryReadLeftmost :: Leftmost x -> IO (Maybe x)
+tryReadLeftmost (Leftmost variable) = fmap snd <$> readTVarIO variable

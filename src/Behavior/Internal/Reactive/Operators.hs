@@ -1,0 +1,161 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- The reactive operators: each is a few lines on the engine.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Reactive.Operators
+  ( -- * Interrupting
+    rSelect
+  , monitor
+
+    -- * Many branches
+  , switch
+  , teleoReactive
+
+    -- * Waiting for a condition, and holding to one
+  , waitUntil
+  , whileHolding
+  ) where
+
+import Data.List (findIndex)
+
+import Behavior.Internal.Failure (Behavior, failWith)
+import Behavior.Internal.Reactive.Engine
+import Behavior.Internal.Signal.Source
+
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Time (atomically)
+-- >>> import qualified Behavior.Signal as Signal
+
+-- | A reactive @if@: runs @left@ while the condition is true and @right@ while it
+-- is false, and switches whenever it changes.
+--
+-- > rSelect (pure True) left right  =  left
+-- > rSelect condition left right    =  switch condition (\c -> if c then left else right)
+--
+-- The condition is read before anything starts. When it changes, the branch that
+-- runs is stopped; when that has ended, cleanup included, the condition is read
+-- again, and what it says then starts (perhaps the same branch, anew).
+--
+-- [Result] That of the branch that completed, also of one that was asked to stop
+--   and completed all the same.
+-- [Failure] A branch that fails, also while it is being stopped, ends the
+--   operator with its failure. A condition that fails, or that has no value any
+--   more, is not \"false\": the branch is stopped and the operator fails.
+-- [Fault] Of a branch or the condition, also while stopping: thrown, after all has
+--   ended. Nothing else starts.
+-- [Cancellation] The branch and the sensors are asked to stop at once; it returns
+--   after they have ended.
+--
+-- >>> Signal.rSelect (pure True) (pure "left") (pure "right")
+-- "left"
+--
+-- /Definition 3.1 and Section 5 of the paper, with a signal for the condition./
+--
+-- @since 0.1.0.0
+rSelect :: Signal Bool -> Behavior a -> Behavior a -> Behavior a
+rSelect condition left right = react "rSelect" condition $ \case
+  True -> Run "left" left
+  False -> Run "right" right
+
+-- | One-sided interruption: runs @task@; whenever the condition becomes true, stops
+-- it, runs @recovery@ to completion, and begins again.
+--
+-- > monitor (pure False) recovery task  =  task
+--
+-- The condition is read before anything starts. When it is true, that is latched:
+-- the task is stopped, and when it has ended, cleanup included, @recovery@ runs to
+-- completion while nothing watches the condition, even if it has become false by
+-- then. After that it is read afresh; the task restarts from its beginning.
+--
+-- [Result] That of the task, also if it was asked to stop and completed all the
+--   same; then the recovery does not run.
+-- [Failure] Of the task or the recovery: ends the operator with it. If the task
+--   fails /while it is being stopped/, the recovery runs first: a cleanup that goes
+--   wrong must not keep the robot from its charger. A condition that fails, or
+--   that has no value any more, is not \"false\": the task is stopped and the
+--   operator fails.
+-- [Fault] Likewise.
+-- [Cancellation] Only the caller can interrupt the recovery; so an outer 'monitor'
+--   outranks an inner one. All is asked to stop at once; it returns after all has
+--   ended.
+--
+-- >>> import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+-- >>> battery <- newTVarIO (5 :: Int)
+-- >>> let recharge = putStrLn "recharge" >> atomically (writeTVar battery 100)
+-- >>> Signal.monitor ((< 10) <$> Signal.watching (readTVar battery)) recharge (putStrLn "work")
+-- recharge
+-- work
+--
+-- /Definition 3.2 and Section 5 of the paper, with a signal for the condition./
+--
+-- @since 0.1.0.0
+monitor :: Signal Bool -> Behavior () -> Behavior a -> Behavior a
+monitor condition recovery task = react "monitor" condition $ \case
+  True -> RunToEnd "recovery" recovery
+  False -> Run "task" task
+
+-- | 'rSelect' with a branch for each value of any type.
+--
+-- All that is said of 'rSelect' holds.
+--
+-- >>> Signal.switch (pure "dock") (\mode -> putStrLn ("in mode " ++ mode))
+-- in mode dock
+--
+-- @since 0.1.0.0
+switch :: Eq k => Signal k -> (k -> Behavior a) -> Behavior a
+switch signal behavior = react "switch" signal (Run "branch" . behavior)
+
+-- | Ordered rules: always runs the first behaviour whose condition holds; while
+-- none holds, it waits.
+--
+-- When an earlier condition becomes true, or the rule's own becomes false, the
+-- running behaviour is stopped, the conditions are read again, and the first that
+-- holds then decides. All that is said of 'rSelect' holds.
+--
+-- >>> Signal.teleoReactive [(pure False, pure "flee"), (pure True, pure "graze")]
+-- "graze"
+--
+-- /After Nilsson's teleo-reactive programs; Section 3.4 of the paper names them./
+--
+-- @since 0.1.0.0
+teleoReactive :: [(Signal Bool, Behavior a)] -> Behavior a
+teleoReactive rules = react "teleoReactive" firstHolding $ \case
+  Nothing -> Idle
+  Just n -> Run ("rule " ++ show (n + 1)) (snd (rules !! n))
+ where
+  firstHolding = findIndex id <$> traverse (suppressEqual . fst) rules
+
+-- | Waits until the condition holds; returns at once if it does.
+--
+-- A condition that fails, faults or has lost its value makes it throw the same.
+--
+-- >>> Signal.waitUntil (pure True)
+--
+-- @since 0.1.0.0
+waitUntil :: Signal Bool -> Behavior ()
+waitUntil condition = react "waitUntil" condition $ \case
+  True -> Conclude (pure ())
+  False -> Idle
+
+-- | Runs the behaviour while the condition holds, and fails when it does not, at
+-- the start or later.
+--
+-- [Result] The behaviour's, also if it was asked to stop and completed all the
+--   same.
+-- [Failure] When the condition does not hold: 'Behavior.FailedBecause' says so. The
+--   behaviour's own failure, also while it is being stopped, is thrown instead.
+-- [Fault] Of the behaviour or the condition, also while stopping: thrown.
+-- [Cancellation] All is asked to stop at once; it returns after all has ended.
+--
+-- >>> Signal.whileHolding (pure False) (putStrLn "grip") ? putStrLn "lost it"
+-- lost it
+--
+-- @since 0.1.0.0
+whileHolding :: Signal Bool -> Behavior a -> Behavior a
+whileHolding condition behavior = react "whileHolding" condition $ \case
+  True -> Run "branch" behavior
+  False -> Conclude (failWith "the condition does not hold")

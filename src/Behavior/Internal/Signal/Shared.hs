@@ -1,0 +1,63 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
+-- |
+-- A signal whose sources are opened once, for several operators.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Signal.Shared
+  ( withShared
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception (ErrorCall (..), finally)
+import Control.Monad (when)
+
+import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Runtime
+import Behavior.Internal.Scope
+import Behavior.Internal.Signal.Source
+
+-- $setup
+-- >>> import Behavior
+-- >>> import qualified Behavior.Signal as Signal
+
+-- | Opens the sources of a signal once, for all its occurrences in a behaviour.
+--
+-- > withShared s body  ~  body s     but with one thread a sensor, not one an occurrence
+--
+-- The sensors are read for as long as the behaviour runs, and are asked to stop
+-- together with it: a cleanup must not wait for them. An operator in there decides on a
+-- reading that began after the operator did, and so waits for the next slot, up to a period.
+-- All that the behaviour throws is thrown. Outside it the shared signal is closed: to open
+-- it there is a fault, an 'ErrorCall'.
+--
+-- >>> import Data.IORef
+-- >>> count <- newIORef (0 :: Int)
+-- >>> let sensor = Signal.polling 0.001 (atomicModifyIORef' count (\n -> (n + 1, n)))
+-- >>> Signal.withShared sensor $ \s -> Signal.rSelect ((==) <$> s <*> s) (pure "one sensor") (pure "two sensors")
+-- "one sensor"
+--
+-- @since 0.1.0.0
+withShared :: Signal a -> (Signal a -> Behavior b) -> Behavior b
+withShared signal body = do
+  -- (A consumer that looks at the times of readings may come later.)
+  source <- open signal everyValue {readingTimes = True}
+  closed <- newTVarIO False
+  -- It closes only when all have ended: some of those that are still stopping may be looking
+  -- just then.
+  structured (sharing source closed) `finally` atomically (writeTVar closed True)
+ where
+  sharing source closed scope = do
+    sensors <- newEmptyTMVarIO
+    let shared = Signal $ \_ -> do
+          atomically stillOpen
+          running <- atomically (readTMVar sensors)
+          let orSensorError value = stillOpen >> sensorError running >>= maybe value throwSTM
+          pure source {workers = [], view = mapView orSensorError <$> view source}
+        stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
+    -- The body comes first, so that its fault is the leftmost.
+    main <- branch scope (Label "withShared" "body") (body shared)
+    (_, running) <- startSensors scope "withShared" source
+    atomically (putTMVar sensors running)
+    outcomeToIO <$> atomically (outcome main)
+  closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"
