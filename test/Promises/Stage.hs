@@ -51,7 +51,7 @@ import Behavior (Behavior, Seconds, sleep)
 import Behavior.Internal.Failure (isCancellation)
 import Behavior.Internal.Runtime
   ( Label (..)
-  , Thread (threadId)
+  , threadId
   , atomically
   , checkpoint
   , throwToAll

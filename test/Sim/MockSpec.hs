@@ -10,7 +10,7 @@ import System.IO.Error (isUserError)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..), Thread (threadId), throwToAll, start, threadEnd)
+import Behavior.Internal.Runtime (Label (..), threadId, throwToAll, start, threadEnd)
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Options (..), Outcome (..), Run (..), Schedule (..), defaults, simulate, simulateWith)

@@ -16,7 +16,8 @@
 module Behavior.Internal.Runtime
   ( -- * Threads
     Label (..)
-  , Thread (threadId)
+  , Thread
+  , threadId
   , threadEnd
   , tryReadEndSTM
   , tryReadEnd
@@ -50,7 +51,8 @@ module Behavior.Internal.Runtime
   , withSink
   ) where
 
-import Control.Concurrent (ThreadId, forkIO, forkIOWithUnmask, myThreadId, throwTo, yield)
+import Control.Concurrent (ThreadId, forkIO, myThreadId, throwTo, yield)
+import Control.Concurrent.Async (Async, asyncThreadId, asyncWithUnmask)
 import Control.Concurrent.STM (STM, TVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
@@ -81,11 +83,17 @@ import qualified Behavior.Internal.Runtime.TimerWheel as Alarm
 import Behavior.Internal.Seconds
 
 -- | A thread that the library has started, and what it publishes as it ends.
+--
+-- (Not an @Async r@: to read the result of that without blocking takes a transaction, and the
+-- transaction that publishes it writes nothing else.)
 data Thread r = Thread
-  { threadId :: {-# UNPACK #-} !ThreadId
+  { threadAsync :: {-# UNPACK #-} !(Async ())
   , threadResult :: {-# UNPACK #-} !(TVar (Maybe r))
   -- ^ Nothing until it has ended, cleanup included.
   }
+
+threadId :: Thread r -> ThreadId
+threadId = asyncThreadId . threadAsync
 
 -- | What the thread published; retries until it has ended.
 threadEnd :: Thread r -> STM r
@@ -118,9 +126,9 @@ startReally :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO 
 startReally finish hook label act = do
   result <- STM.newTVarIO Nothing
   add threads 1
-  -- Forked masked: an exception cannot strike before 'try' is in place, nor
-  -- between the end of the action and the publication of how it ended.
-  thread <- forkIOWithUnmask $ \unmask -> do
+  -- The thread is masked, as the caller is: an exception is raised neither before 'try' is in
+  -- place, nor between the end of the action and the publication of its outcome.
+  thread <- asyncWithUnmask $ \unmask -> do
     end <- runThread emit label (unmask act) >>= finish
     STM.atomically (STM.writeTVar result (Just end) >> hook end)
   pure (Thread thread result)

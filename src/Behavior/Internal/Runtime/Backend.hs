@@ -12,6 +12,7 @@ module Behavior.Internal.Runtime.Backend
   ) where
 
 import Control.Concurrent (ThreadId)
+import Control.Concurrent.Async (Async)
 import Control.Concurrent.STM (STM)
 import Control.Exception (SomeException)
 
@@ -40,7 +41,7 @@ data Event
 data Simulator = Simulator
   { isRunning :: ThreadId -> IO Bool
   -- ^ Whether this is the one thread of the simulation that runs just now.
-  , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO ThreadId
+  , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO (Async ())
   -- ^ Starts a thread, masked, and publishes what it gives as it ends. The thread is given
   -- an action to begin with, in which an early cancellation arrives, and how to unmask.
   , deliver :: ThreadId -> SomeException -> IO ()

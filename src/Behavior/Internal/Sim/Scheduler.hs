@@ -18,6 +18,7 @@ module Behavior.Internal.Sim.Scheduler
   ) where
 
 import Control.Concurrent
+import Control.Concurrent.Async (Async, asyncOnWithUnmask, asyncThreadId)
 import Control.Concurrent.STM (STM, catchSTM, orElse, throwSTM)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
@@ -45,8 +46,7 @@ simulation sim =
     , spawn = \label' body publish -> do
         operation sim AlwaysEnabled
         me <- readIORef (current sim)
-        task <- launch sim (taskNumber me) label' body publish
-        maybe (throwIO (ErrorCall "unreachable")) pure (taskThread task)
+        snd <$> launch sim (taskNumber me) label' body publish
     , deliver = \target e -> withTarget target $ \me there ->
         if taskNumber there == taskNumber me
           then throwTo target e
@@ -79,15 +79,16 @@ simulation sim =
   untilRaised there p = operation sim (Delivery there p) `onException` withdraw sim there p
 
 -- | Starts a real thread for a task; it waits for its turn.
-launch :: Sim -> Int -> Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO Task
+launch :: Sim -> Int -> Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO (Task, Async ())
 launch sim mother label' body publish = do
   entrance <- newEmptyMVar
-  thread <- mask_ $ forkOnWithUnmask (capability sim) $ \unmask -> do
+  thread <- mask_ $ asyncOnWithUnmask (capability sim) $ \unmask -> do
     uninterruptibleMask_ (takeMVar entrance)
     self <- readIORef (current sim)
     a <- body (arrive sim self) unmask
     uninterruptibleMask_ (leave sim self (publish a))
-  enlist sim mother label' (Just (thread, entrance)) Unstarted
+  task <- enlist sim mother label' (Just (asyncThreadId thread, entrance)) Unstarted
+  pure (task, thread)
 
 enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> Position -> IO Task
 enlist sim mother label' thread here = do

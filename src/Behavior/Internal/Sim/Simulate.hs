@@ -88,7 +88,7 @@ simulateBy o chooser' act = do
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
   sim <- newSim o chooser'
   mask $ \restore -> withBackend n (simulation sim) . watched n sim $ do
-    main <- launch sim (-1) (Label "main" "") (\begin unmask -> try (unmask (begin >> act)) >>= writeIORef result . Just) (const (pure ()))
+    (main, _) <- launch sim (-1) (Label "main" "") (\begin unmask -> try (unmask (begin >> act)) >>= writeIORef result . Just) (const (pure ()))
     writeIORef (current sim) main
     putMVar (gate main) ()
     verdict <- try (restore (takeMVar (runEnd sim)))
