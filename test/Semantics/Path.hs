@@ -19,6 +19,7 @@ module Semantics.Path
 
 import Control.Monad (foldM)
 import qualified Data.Map.Strict as Map
+import Data.List (foldl')
 import Data.Maybe (mapMaybe)
 import Data.Set (Set)
 import qualified Data.Set as Set
@@ -110,8 +111,13 @@ silently fuel slip visible limit states = go states (Set.toList states)
     s : others
       | Set.size known > fuel -> Nothing
       | otherwise ->
-          let new = filter (`Set.notMember` known) (quietly s)
-           in go (foldr Set.insert known new) (new ++ others)
+          let (known', others') = foldl' add (known, others) (quietly s) in go known' others'
+  -- (To insert and to compare the sizes costs half of what it costs to look first.)
+  add (known, others) s
+    | Set.size known' > Set.size known = (known', s : others)
+    | otherwise = (known, others)
+   where
+    known' = Set.insert s known
   quietly s = case step s of
     [] -> [later | later <- pass slip s, maybe True (clock (now later) <=) limit]
     next -> [s' | (e, s') <- next, not (visible e)]

@@ -42,8 +42,8 @@ import Semantics.Filter
 import Semantics.Program
 
 data State = State
-  { now :: Now
-  , running :: Running
+  { running :: Running
+  , now :: Now
   }
   deriving (Eq, Ord, Show)
 

@@ -28,16 +28,16 @@ import Semantics.Verdict
 
 -- | What may happen next.
 step :: State -> [(Transition, State)]
-step (State t r) = [(event, State t' r') | (Happens event, t', r') <- steps t r]
+step (State r t) = [(event, State r' t') | (Happens event, t', r') <- steps t r]
 
 -- | Time passes, up to the next moment at which something can happen; or to a later one, as
 -- long as that makes nothing late by the given number of ticks. Only for states in which
 -- nothing else can happen.
 pass :: Ticks -> State -> [State]
-pass slip (State t r) = case filter (> clock t) (moments r) of
+pass slip (State r t) = case filter (> clock t) (moments r) of
   [] -> []
   coming ->
-    [ State t {clock = at} (afterwards r)
+    [ State (afterwards r) t {clock = at}
     | let next = minimum coming
     , at <- Set.toList (Set.fromList coming)
     , at == next || at < next + slip
