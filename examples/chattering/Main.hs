@@ -1,7 +1,7 @@
 -- |
 -- Section 3.4 of the paper: a battery near its threshold, under the paper's 'rSelect',
--- which interrupts the charging as readily as the task, and under 'monitor', which
--- does not.
+-- which interrupts the charging as well as the task, and under 'monitor', which interrupts
+-- only the task.
 module Main (main) where
 
 import System.IO (BufferMode (..), hSetBuffering, stdout)
@@ -20,7 +20,7 @@ main = runBehavior $ do
   observe "rSelect (battery > 10) task recharge" Chattering.bt
   observe "monitor batteryLow recharge task" (monitor batteryLow recharge task)
 
--- | Runs the behaviour for a minute of a world of its own, and shows what it did.
+-- | Runs the behaviour for a minute in its own world, and shows what it did.
 observe :: String -> Behavior () -> Behavior ()
 observe title behavior = do
   world <- newWorld nearThreshold

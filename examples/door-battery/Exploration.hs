@@ -1,5 +1,5 @@
 -- |
--- Many simulated missions, and the worst of them.
+-- Many simulated missions, and the worst one.
 module Exploration
   ( explored
   , worst
@@ -16,8 +16,8 @@ import Behavior.Sim (Schedule (..))
 import Mission
 import Options
 
--- | Simulates so many missions. Each has a number, which is both its seed and its
--- schedule; with it stands what came of it, if it came to an end.
+-- | Simulates the given number of missions. Each has a number, which is both its seed and
+-- its schedule, and a result, if it ended.
 explored :: Int -> Options -> IO [(Integer, Maybe Mission)]
 explored n o =
   for (take n [fromMaybe 1 (seed o) ..]) $ \k ->
@@ -26,11 +26,11 @@ explored n o =
 endOf :: Maybe Mission -> End
 endOf = maybe NotOver end
 
--- | How the worst of them ended.
+-- | How the worst mission ended.
 worst :: [(Integer, Maybe Mission)] -> End
 worst = maximum . map (endOf . snd)
 
--- | A report, which says how to see the worst again.
+-- | A report, with the options that replay the worst missions.
 reported :: [(Integer, Maybe Mission)] -> [String]
 reported missions =
   [show (length missions) ++ " missions, each with a schedule and a seed of its own"]
@@ -47,7 +47,7 @@ reported missions =
  where
   ending how = [k | (k, m) <- missions, endOf m == how]
   ended = [(k, m) | (k, Just m) <- missions]
-  -- Of what went well there is no need to see one.
+  -- A mission that went well needs no replay.
   first how ks = if how == TaskDone then "" else foldMap replay (take 1 ks)
   replay k = ": --simulate --seed " ++ show k ++ " --schedule " ++ show k
   fixed :: Double -> String

@@ -1,6 +1,6 @@
 -- |
--- The paper's example in a mock world: prints what the robot does, as it happens; or,
--- in a simulation, what it would do.
+-- The paper's example in a mock world: prints what the robot does, in real time or in a
+-- simulation.
 module Main (main) where
 
 import Data.Foldable (traverse_)
@@ -18,12 +18,12 @@ import Options
 main :: IO ()
 main = do
   o <- getArgs >>= handleParseResult . parse
-  hSetBuffering stdout LineBuffering -- whoever reads a pipe sees what happens as it happens
+  hSetBuffering stdout LineBuffering -- so that a pipe gets each line at once
   how <- runBehavior $ case mode o of
     Really -> end <$> mission o putStrLn
     Simulated number -> do
-      (story, m) <- simulated o (maybe NonPreemptive (Seeded . fromInteger) number)
-      traverse_ putStrLn story
+      (report, m) <- simulated o (maybe NonPreemptive (Seeded . fromInteger) number)
+      traverse_ putStrLn report
       pure (maybe NotOver end m)
     Explored n -> do
       missions <- explored n o

@@ -25,23 +25,23 @@ import Robot (inWorld)
 import Variation (variation)
 import World
 
--- | What came of a mission.
+-- | The result of a mission.
 data Mission = Mission
   { end :: !End
   , lasted :: !Seconds
   -- ^ In the time of the world.
   , lowest :: !Double
-  -- ^ To what level the battery came down: percent.
+  -- ^ The lowest level of the battery: percent.
   }
   deriving (Eq, Show)
 
--- | How a mission ended; the later in this list, the worse.
+-- | How a mission ended, from best to worst.
 data End
   = TaskDone
   | TaskDoneOutside
   | RobotFailed
   | RanFlat
-  | -- | After what would be an hour; of simulated missions only.
+  | -- | Still running after a simulated hour; for simulated missions only.
     NotOver
   deriving (Eq, Ord, Show, Enum, Bounded)
 
@@ -53,7 +53,7 @@ inWords how = case how of
   RanFlat -> "fault of the world: " ++ displayException BatteryFlat
   NotOver -> "not over after what would be an hour: given up"
 
--- | The exit status that says so.
+-- | The exit status for each end.
 status :: End -> ExitCode
 status how = case how of
   TaskDone -> ExitSuccess
@@ -62,20 +62,22 @@ status how = case how of
   RanFlat -> ExitFailure 3
   NotOver -> ExitFailure 4
 
--- | Tells what the robot does, line by line as it happens, and how that ends.
+-- | Runs a mission, and passes each line of its report to the given function as it happens;
+-- the last line is how it ended.
 mission :: Options -> (String -> Behavior ()) -> Behavior Mission
-mission o tell = do
+mission o printLine = do
   factor <- maybe (pure (pure 1)) variation (seed o)
   world <- newWorld (settingOf o factor)
   let robot = firstOf [behavior (program o), flat world]
-      story = inWorld world (narrating world (tell . describe) robot)
+      narrated = inWorld world (narrating world (printLine . describe) robot)
   (how, why) <-
-    (story >> succeeded world)
+    (narrated >> succeeded world)
       `catches` [Handler (failedWith world), Handler (\BatteryFlat -> pure (RanFlat, ""))]
   t <- clock world
   percent <- batteryNow world
-  tell (line t percent (inWords how ++ why))
-  -- The level falls but for when it is recharged, and then that begins.
+  printLine (line t percent (inWords how ++ why))
+  -- The level only falls, except while recharging. So the lowest one is at the beginning
+  -- of a recharging, or at the end.
   levels <- map charge <$> happened world
   pure Mission {end = how, lasted = t, lowest = minimum (percent : levels)}
 
@@ -97,36 +99,36 @@ succeeded world = do
   inside <- readTVarIO (holds world InsideRoom)
   pure (if inside then TaskDone else TaskDoneOutside, "")
 
--- | The failure that gets out is that of the last action that failed.
+-- | The failure that ends the mission is that of the last action that failed.
 failedWith :: World -> BehaviorFailed -> Behavior (End, String)
 failedWith world failure = do
-  events <- happened world
+  changes <- happened world
   pure . (,) RobotFailed $
-    case [" at \"" ++ action e ++ "\": " ++ why | e@WorldChange {changeKind = Fails why} <- events] of
+    case [" at \"" ++ action e ++ "\": " ++ why | e@WorldChange {changeKind = Fails why} <- changes] of
       [] -> ": " ++ displayException failure
       places -> last places
 
--- | Runs the mission in virtual time, by this schedule. Gives the lines of its story, and
--- what came of it; nothing, if it would not be over after an hour.
+-- | Runs the mission in virtual time, under this schedule. Returns the lines of its report,
+-- and its result, or 'Nothing' if it is not over after an hour.
 --
--- (The lines are not printed meanwhile: a simulation must not wait for who reads them.)
+-- (The lines are not printed meanwhile: a simulation must not block on output.)
 simulated :: Options -> Schedule -> IO ([String], Maybe Mission)
 simulated o schedule' = do
-  told <- newIORef []
-  run <- simulateWith options' (mission o (\text -> modifyIORef told (text :)))
-  story <- reverse <$> readIORef told
+  printed <- newIORef []
+  run <- simulateWith options' (mission o (\text -> modifyIORef printed (text :)))
+  report <- reverse <$> readIORef printed
   case outcome run of
-    Returned m -> pure (story, Just m)
-    OutOfTime -> notOver story
-    Livelock _ -> notOver story -- the hour would never pass
+    Returned m -> pure (report, Just m)
+    OutOfTime -> notOver report
+    Livelock _ -> notOver report -- the hour would never pass
     Faulting e -> throwIO e
     Cancelled e -> throwIO e
     other -> throwIO (ErrorCall ("the simulation: " ++ explain other))
  where
-  notOver story = pure (story ++ [inWords NotOver], Nothing)
+  notOver report = pure (report ++ [inWords NotOver], Nothing)
   options' =
     defaults
       { Sim.scheduled = schedule'
-      , Sim.endAt = 3600 -- computed in seconds
-      , Sim.realTimeLimit = 1 / 0 -- who waits can press Ctrl-C
+      , Sim.endAt = 3600 -- takes a few seconds of real time
+      , Sim.realTimeLimit = 1 / 0 -- the user can press Ctrl-C
       }

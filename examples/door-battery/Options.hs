@@ -32,25 +32,25 @@ data Options = Options
   }
   deriving (Eq, Show)
 
--- | The versions of the program that are in the paper.
+-- | The versions of the program in the paper.
 data Program = First | WithDo | OverDoors | WithAttempts | Introduction
   deriving (Eq, Show, Enum, Bounded)
 
--- | How the mission is run, and how often.
+-- | How missions are run, and how many.
 data Mode
   = Really
-  | -- | By the random schedule of this number; else by the undisturbed one.
+  | -- | Under the random schedule with this number, or under the non-preemptive one.
     Simulated (Maybe Integer)
-  | -- | So many missions.
+  | -- | This number of missions.
     Explored Int
   deriving (Eq, Show)
 
--- | Reads the arguments. The result of anything wrong with them has the exit code 2,
--- and a message that says what would be right.
+-- | Reads the arguments. If they are wrong, the result has exit code 2 and a message with
+-- the allowed values.
 parse :: [String] -> ParserResult Options
-parse arguments = execParserPure defaultPrefs commandLine arguments >>= honest
+parse arguments = execParserPure defaultPrefs commandLine arguments >>= checked
  where
-  honest o
+  checked o
     | lowBelow o /= printedThreshold && program o `notElem` [First, WithDo] =
         refuse $
           "option --threshold: program " ++ programName (program o) ++ " is printed with a \
@@ -98,7 +98,7 @@ options =
     <*> (simulation <|> exploration <|> pure Really)
  where
   simulation =
-    flag' Simulated (long "simulate" <> help "the same in virtual time: what happens is told at once")
+    flag' Simulated (long "simulate" <> help "the same in virtual time: the whole report is printed at once")
       <*> optional
         (option (reader wholeNumber) . mconcat $
           [ long "schedule"
@@ -111,7 +111,7 @@ options =
       , metavar "N"
       , help
           "simulate N missions, with the seeds and schedules 1, 2 and so on (or from --seed on), \
-          \and tell only the worst"
+          \and report only the worst"
       ]
   given name meta kind byDefault what =
     option (reader kind) . mconcat $
@@ -173,7 +173,7 @@ programName = \case
   WithAttempts -> "4"
   Introduction -> "intro"
 
--- | The threshold that programs 3, 4 and intro have in their text.
+-- | The threshold in the text of programs 3, 4 and intro.
 printedThreshold :: Int
 printedThreshold = 10
 
@@ -227,6 +227,6 @@ digits word
   | not (null word) && all isDigit word = readMaybe word
   | otherwise = Nothing
 
--- | A number that is right. NaN never is.
+-- | A number that satisfies the condition. NaN never does.
 number :: (Double -> Bool) -> String -> Maybe Double
-number right = mfilter right . readMaybe
+number condition = mfilter condition . readMaybe

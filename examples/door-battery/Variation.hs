@@ -1,5 +1,5 @@
 -- |
--- Numbers that look random, and are the same for the same seed.
+-- Pseudorandom numbers, which are equal for equal seeds.
 module Variation
   ( variation
   ) where
@@ -10,7 +10,7 @@ import Data.Word (Word64)
 import Behavior (Behavior)
 import Behavior.STM (atomically, newTVarIO, stateTVar)
 
--- | Each run of the behaviour that this gives gives another factor from 0.8 to 1.2.
+-- | Makes a behaviour that returns another factor from 0.8 to 1.2 each time it runs.
 variation :: Integer -> IO (Behavior Double)
 variation seed = do
   state <- newTVarIO (fromInteger seed)
@@ -18,7 +18,7 @@ variation seed = do
  where
   factor word = 0.8 + 0.4 * fromIntegral (word `shiftR` 11) / 2 ^ (53 :: Int)
 
--- | A step of SplitMix: a number, and the state after it.
+-- | A step of SplitMix: a number, and the next state.
 next :: Word64 -> (Word64, Word64)
 next state = (mixed state', state')
  where

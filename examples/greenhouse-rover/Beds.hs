@@ -1,9 +1,9 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- The plant beds that are to be inspected, and what was found. A bed is on the list until
--- it is settled: its result is entered and it is taken off the list in one transaction.
--- So whatever interrupts an inspection, no bed is lost, and none is settled twice.
+-- The plant beds to be inspected, and the findings. A bed stays on the list until it is
+-- settled: one transaction enters its finding and removes it from the list. So whatever
+-- interrupts an inspection, no bed is lost, and none is settled twice.
 module Beds
   ( House (..)
   , Bed (..)
@@ -42,8 +42,8 @@ data Beds = Beds
 newBeds :: [Bed] -> IO Beds
 newBeds beds = Beds <$> newTVarIO beds <*> newTVarIO Map.empty <*> newTVarIO True
 
--- | Puts a bed at the end of the list. Refused (false) when it is known already, or the
--- list is closed: then the rover would not see to it any more.
+-- | Adds a bed to the end of the list, and returns whether it did. It does not if the bed
+-- is known already, or if the list is closed, since then the rover inspects no more beds.
 addBed :: Beds -> Bed -> STM Bool
 addBed beds bed = do
   isOpen <- readTVar (open beds)
@@ -56,13 +56,13 @@ nextBed beds = readTVar (waiting beds) >>= \case
   [] -> pure Nothing
   bed : _ -> pure (Just bed)
 
--- | Takes the bed off the list. What was found first stands.
+-- | Removes the bed from the list. If it has a finding already, that one is kept.
 settle :: Beds -> Bed -> Finding -> STM ()
 settle beds bed finding = do
   modifyTVar' (waiting beds) (filter (/= bed))
   modifyTVar' (settled beds) (Map.insertWith (\_ first -> first) bed finding)
 
--- | Closes the list if nothing is left on it, and says whether it did.
+-- | Closes the list if it is empty, and returns whether it did.
 closeIfEmpty :: Beds -> STM Bool
 closeIfEmpty beds = do
   isEmpty <- null <$> readTVar (waiting beds)

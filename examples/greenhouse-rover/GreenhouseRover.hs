@@ -37,31 +37,32 @@ data Mode = Auto | Manual | Park
 data Place = AtDock House | AtBed Bed
   deriving (Eq, Show)
 
--- | What the behaviour needs: on the rover the hardware, in a test a mock.
+-- | What the behaviour needs: the hardware on the rover, a mock in a test.
 data Rover = Rover
   { motorsOn, motorsOff :: Behavior ()
   , steerTo :: Place -> Behavior ()
   -- ^ Returns when the wheels have turned far enough.
   , backOff :: Behavior ()
   , joystick :: Behavior ()
-  -- ^ Drives as the operator wants, for ever.
+  -- ^ Drives as the human operator steers, until it is cancelled.
   , position :: Signal Place
   , bumper, emergencyStop, someoneNear :: Signal Bool
   , armOut, armPark :: Behavior ()
   , camera :: Bed -> Behavior String
   -- ^ May hang, or throw an 'IOException'.
   , openDoor, closeDoor :: Behavior ()
-  -- ^ Of the door between the houses.
+  -- ^ The door between the houses.
   , batteryLevel :: Behavior Double
   -- ^ Percent, with noise.
   , plugIn :: House -> Behavior ()
-  -- ^ Begins to charge at the dock of this house. Fails when another rover is there.
+  -- ^ Starts charging at the dock of this house. Fails when another rover is there.
   , askMode :: Behavior Mode
-  -- ^ Asks the operator by radio. Hangs when the radio link is lost.
+  -- ^ Reads the mode that the human operator has chosen, by radio. Hangs when the radio
+  -- link is lost.
   , writeLog :: String -> Behavior ()
   }
 
--- | How the behaviour ends when somebody presses the emergency stop.
+-- | The failure with which the behaviour ends when the emergency stop is pressed.
 data EmergencyStopped = EmergencyStopped
   deriving (Eq, Show)
 
@@ -83,8 +84,8 @@ rover hardware beds = mission `finallyAlways` (motorsOff hardware `finally` armP
   battery = Signal.polling 0.5 (batteryLevel hardware)
 
 -- | Ends the behaviour when the emergency stop is pressed. The motors are switched off at
--- once, while the behaviour is still being stopped; and as there is no permit any more, it
--- cannot switch them on meanwhile.
+-- once, before the behaviour has stopped; as the permit is taken, the behaviour cannot
+-- switch them on again meanwhile.
 untilEmergency :: Rover -> (Rover -> Behavior a) -> Behavior a
 untilEmergency r act = do
   permit <- newTMVarIO ()
@@ -93,8 +94,8 @@ untilEmergency r act = do
       pressed = Signal.waitUntil (emergencyStop r) >> takeIt >> motorsOff r >> throwIO EmergencyStopped
   firstOf [pressed, act r {motorsOn = bracket_ takeIt giveBack (motorsOn r)}]
 
--- | Writes the log in the background: 'writeLog' does not wait any more. A log that cannot be
--- written does not end the behaviour.
+-- | Writes the log in the background: inside, 'writeLog' does not block. A log that cannot
+-- be written does not end the behaviour.
 logging :: Rover -> (Rover -> Behavior a) -> Behavior a
 logging r act = do
   entries <- newTQueueIO
@@ -104,11 +105,11 @@ logging r act = do
     _ <- fork nursery (forever (atomically (readTQueue entries) >>= write) `finally` writeRest)
     act r {writeLog = atomically . writeTQueue entries}
 
--- | Does what is right for the mode that the operator has chosen. Without a radio link the
--- rover stands still and waits for it.
+-- | Runs the behaviour for the mode that the human operator has chosen. Without a radio link
+-- the rover stands still until the link is back.
 underOrders :: Rover -> (Mode -> Behavior a) -> Behavior a
 underOrders r act = do
-  -- A failure of the branch is its result here. What is left is a failure of the signal.
+  -- A failure of the branch is returned as its result. So 'Left' is a failure of the signal.
   ended <- tryFailure (Signal.switch (Signal.debounce 0.8 mode) (tryFailure . act))
   case ended of
     Right result -> either throwIO pure result
@@ -139,7 +140,7 @@ recharge r charged = do
     plugIn r house
     timeout 600 (Signal.waitUntil charged)
 
--- | Until nothing is left on the list, also nothing that was added meanwhile.
+-- | Inspects beds until the list is empty, including beds that are added meanwhile.
 inspectAll :: Rover -> Beds -> Behavior (Map.Map Bed Finding)
 inspectAll r beds =
   atomically (nextBed beds) >>= \case
@@ -163,15 +164,15 @@ inspect r beds bed = do
 photograph :: Rover -> Beds -> Bed -> Behavior ()
 photograph r beds bed = shot ? attempt 2 (sleep 1 >> shot)
  where
-  -- No interruption comes between the picture and its entry on the list: both are done by
-  -- the branch of the limit itself, under one mask.
+  -- Nothing interrupts between taking the picture and entering it: the branch of 'timeout'
+  -- does both, under one mask.
   shot = timeout 2 (mask_ (picture >>= atomically . settle beds bed . Picture))
   picture = failingOn (const True :: IOException -> Bool) (camera r bed)
 
 -- | Drives to the place, through the door if it is in the other house.
 drive :: Rover -> Place -> Behavior ()
 drive r place = do
-  here <- Signal.switch (position r) pure -- as it is now
+  here <- Signal.switch (position r) pure -- the current position
   unless (here == place) $
     if houseOf here == houseOf place
       then move
@@ -191,7 +192,7 @@ houseOf = \case
 withMotors :: Rover -> Behavior a -> Behavior a
 withMotors r act = (motorsOn r >> act) `finallyAlways` motorsOff r
 
--- | A cleanup that takes its time, as to park the arm does, must not itself be interrupted:
--- neither by the emergency stop nor by the battery.
+-- | 'finally' for a cleanup that takes time, such as parking the arm. Nothing must interrupt
+-- it: neither the emergency stop nor the battery.
 finallyAlways :: Behavior a -> Behavior () -> Behavior a
 finallyAlways act cleanup = act `finally` uninterruptibleMask_ cleanup

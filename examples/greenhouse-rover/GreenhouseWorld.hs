@@ -12,7 +12,7 @@ import Behavior.Sim.Mock
 import qualified Behavior.Signal as Signal
 import GreenhouseRover
 
--- | At what times (in seconds) what becomes so, and what the camera does.
+-- | What changes at which times (in seconds), and what the devices do.
 data Setting = Setting
   { battery :: [(Seconds, Double)]
   , emergency, someone, bumps :: [(Seconds, Bool)]
@@ -23,7 +23,7 @@ data Setting = Setting
   , logged :: String -> Behavior ()
   }
 
--- | Nothing happens but what the rover does.
+-- | Nothing happens except what the rover does.
 calm :: Setting
 calm =
   Setting

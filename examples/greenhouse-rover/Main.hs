@@ -1,6 +1,6 @@
 -- |
--- The greenhouse rover in its mock greenhouses, in real time: prints its log as it works,
--- and then what it has found.
+-- The greenhouse rover in its mock greenhouses, in real time: prints its log while it
+-- works, and then its findings.
 module Main (main) where
 
 import qualified Data.Map.Strict as Map
@@ -38,7 +38,7 @@ main = do
     found <- rover hardware beds
     mapM_ print (Map.toList found)
 
--- | After how many seconds somebody presses the emergency stop; never without an argument.
+-- | After how many seconds the emergency stop is pressed; never if there is no argument.
 emergencyFrom :: [String] -> IO [Seconds]
 emergencyFrom arguments = case (arguments, mapM readMaybe arguments) of
   ([], _) -> pure []

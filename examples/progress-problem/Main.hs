@@ -22,19 +22,19 @@ main = runBehavior $ do
   compose "In this language: action1 >> action2" $ \clock action1 action2 ->
     ticked clock action1 >> ticked clock action2
 
--- | Composes two actions of three ticks each, gives them a hundred ticks, and shows what
--- came of it.
+-- | Composes two actions of three ticks each, runs them for at most a hundred ticks, and
+-- shows the result.
 compose :: String -> (Clock -> Node -> Node -> Behavior ()) -> Behavior ()
 compose title composition = do
   clock <- newClock 100
   action1 <- action clock "action1" 3
   action2 <- action clock "action2" 3
   ended <- try (composition clock action1 action2)
-  happenings <- journal clock
+  changes <- journal clock
   putStrLn title
-  traverse_ (putStrLn . entry) (take 8 happenings)
-  when (length happenings > 8) $ putStrLn "  ..."
-  let started = starts happenings
+  traverse_ (putStrLn . entry) (take 8 changes)
+  when (length changes > 8) $ putStrLn "  ..."
+  let started = starts changes
   putStrLn ("  action1 was started " ++ started "action1" ++ ", action2 " ++ started "action2")
   putStrLn ("  " ++ either because (const "done") ended)
  where
@@ -43,7 +43,7 @@ compose title composition = do
     Started -> "starts"
     Succeeded -> "has succeeded"
     Halted -> "is halted"
-  starts happenings name = case length [() | (_, n, Started) <- happenings, n == name] of
+  starts changes name = case length [() | (_, n, Started) <- changes, n == name] of
     1 -> "once"
     n -> show n ++ " times"
   because failure = displayException (failure :: BehaviorFailed)

@@ -2,7 +2,7 @@
 
 -- |
 -- Classical behaviour trees, as Sections 2 and 3.1 of the paper describe them: a tree
--- is ticked at its root, again and again, and every node answers with a status.
+-- is ticked at its root, again and again, and every tick of a node returns a status.
 module Tick
   ( -- * Trees
     Status (..)
@@ -34,18 +34,18 @@ data Status = Success | Failure | Running
 data Node = Node
   { tick :: IO Status
   , halt :: IO ()
-  -- ^ Stops what it has running, if anything.
+  -- ^ Stops the actions that it has started, if any are running.
   }
 
--- | Sequence: on every tick, ticks its children from left to right, beginning with the
--- first, until one does not succeed.
+-- | Sequence: on every tick, ticks its children from left to right, from the first one
+-- on, until one does not succeed.
 sequenceOf :: [Node] -> Node
 sequenceOf children = Node {tick = from children, halt = traverse_ halt children}
  where
   from [] = pure Success
   from (child : others) = tick child >>= \case
     Success -> from others
-    -- What runs further right was started on an earlier tick, and has lost its turn.
+    -- Children further right may still run from an earlier tick: they are halted.
     status -> status <$ traverse_ halt others
 
 -- | Sequence that remembers which of its children have succeeded.
@@ -64,14 +64,14 @@ sequenceWithMemory children = do
 data ChangeKind = Started | Succeeded | Halted
   deriving (Eq, Show)
 
--- | An action of this name that goes on by itself for so many ticks, and then has
--- succeeded. A tick starts it, or asks how it is getting on.
+-- | An action with this name that runs by itself for the given number of ticks and then
+-- has succeeded. A tick starts it, or reads its status.
 action :: Clock -> String -> Int -> IO Node
 action clock name duration = do
   startedAt <- newIORef Nothing
-  let note what = readIORef (ticks clock) >>= \t -> modifyIORef' (entries clock) ((t, name, what) :)
-      stop what = writeIORef startedAt Nothing >> note what
-      start = readIORef (ticks clock) >>= writeIORef startedAt . Just >> note Started
+  let record kind = readIORef (ticks clock) >>= \t -> modifyIORef' (entries clock) ((t, name, kind) :)
+      stop kind = writeIORef startedAt Nothing >> record kind
+      start = readIORef (ticks clock) >>= writeIORef startedAt . Just >> record Started
       poll since = do
         t <- readIORef (ticks clock)
         if t - since >= duration then Success <$ stop Succeeded else pure Running
@@ -81,7 +81,7 @@ action clock name duration = do
       , halt = readIORef startedAt >>= \running -> for_ running (const (stop Halted))
       }
 
--- | Counts ticks, up to a limit, and keeps a journal of what the actions do.
+-- | Counts ticks, up to a limit, and keeps a journal of the changes of the actions.
 data Clock = Clock
   { limit :: Int
   , ticks :: IORef Int
@@ -91,12 +91,12 @@ data Clock = Clock
 newClock :: Int -> IO Clock
 newClock n = Clock n <$> newIORef 0 <*> newIORef []
 
--- | Everything that the actions did: at which tick, which action, and what.
+-- | All changes of the actions: the tick, the action, and the change.
 journal :: Clock -> IO [(Int, String, ChangeKind)]
 journal clock = reverse <$> readIORef (entries clock)
 
--- | A tree as a behaviour: ticks it until it has succeeded or failed. It fails, too,
--- when the clock has reached its limit.
+-- | A tree as a behaviour: ticks it until it has succeeded or failed. It also fails when
+-- the clock reaches its limit.
 ticked :: Clock -> Node -> Behavior ()
 ticked clock node = go `onException` halt node
  where

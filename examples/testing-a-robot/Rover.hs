@@ -23,7 +23,7 @@ data Rover = Rover
   , batteryLow, redButton :: Signal Bool
   }
 
--- | Patrols, and goes home when the battery is low, until somebody presses the button.
+-- | Patrols, and goes home when the battery is low, until the button is pressed.
 mission :: (Rover -> Behavior ()) -> Rover -> Behavior ()
 mission home rover =
   untilButton rover (Signal.monitor (batteryLow rover) (home rover) (patrol rover))
@@ -42,7 +42,7 @@ goHomeAtFirst rover = do
   driveHome rover `finally` motorOff rover
   charge rover
 
--- | The version that was mended.
+-- | The corrected version.
 goHome :: Rover -> Behavior ()
 goHome rover = do
   bracket_ (motorOn rover) (motorOff rover) (honk rover >> driveHome rover)

@@ -1,5 +1,5 @@
 -- |
--- The trials of the rover in the tutorial "Testing a robot".
+-- The tests of the rover in the tutorial "Testing a robot".
 module RoverTrial
   ( trial
   , well
@@ -21,8 +21,8 @@ import Behavior.Sim
 import Behavior.Sim.Mock
 import Rover
 
--- | Tries what the rover is to do, with the button pressed at these times. The last
--- argument runs it.
+-- | Runs a task of the rover in a mock field, with the button pressed at the given times,
+-- and checks the record. The last argument is the function that runs the behaviour.
 trial :: (Rover -> Behavior ()) -> [(Seconds, Bool)] -> (Behavior () -> IO ()) -> IO ()
 trial task pressed run = do
   field <- newMock
@@ -48,19 +48,19 @@ trial task pressed run = do
       }
   field `shouldRecord` whenever (becoming "motor runs" True) (eventually (becoming "motor runs" False))
 
--- | What is expected of a run itself: that the behaviour returned.
+-- | Expects that the behaviour returned.
 well :: Run () -> IO ()
 well run = case outcome run of
   Returned () -> pure ()
   other -> fail (explain other)
 
--- | The button is pressed at the very moment when the battery becomes low.
+-- | The button is pressed at the moment when the battery becomes low.
 wholeMission :: (Rover -> Behavior ()) -> Plan -> IO Report
 wholeMission home plan =
   explore plan $ \simulated ->
     trial (mission home) [(0, False), (5, True)] (simulated >=> well)
 
--- | Nothing but the way home; the button is pressed from the beginning.
+-- | Only the way home; the button is pressed from the beginning.
 wayHome :: (Rover -> Behavior ()) -> Plan -> IO Report
 wayHome home plan =
   explore plan $ \simulated ->
@@ -72,7 +72,7 @@ asHspec (SomeException e) = case cast e of
   Just (HUnitFailure _ why) -> formatFailureReason why
   Nothing -> displayException e
 
--- | At this time the rover is home and charged, if nobody presses the button.
+-- | Expects that the rover is home and charged at this time, if the button is not pressed.
 charged :: Seconds -> Plan -> IO Report
 charged time plan =
   explore plan {showException = asHspec} $ \simulated ->

@@ -1,6 +1,6 @@
 -- |
 -- A battery whose level changes at a constant rate, until the rate is changed. Its
--- level is computed when it is asked for, so that nothing has to tick.
+-- level is computed when it is read, so no thread has to update it.
 module Battery
   ( Battery
   , charged
@@ -15,8 +15,8 @@ module Battery
 
 import Behavior.Time (Seconds)
 
--- | The level (0 to 100 percent) that it had at some moment, and since then the
--- rate (percent a second) at which it fills or drains.
+-- | The level (0 to 100 percent) at a certain moment, and the rate (percent per second)
+-- at which the battery has filled or drained since then.
 data Battery = Battery
   { level :: Double
   , rate :: Double
@@ -24,22 +24,22 @@ data Battery = Battery
   }
   deriving (Eq, Show)
 
--- | A battery of this level at the time 0, which keeps it.
+-- | A battery that has this level at time 0 and keeps it.
 charged :: Double -> Battery
 charged percent = Battery {level = percent, rate = 0, since = 0}
 
 levelAt :: Seconds -> Battery -> Double
 levelAt t b = max 0 (min 100 (level b + rate b * realToFrac (t - since b)))
 
--- | A level as it is read: whole percents, of a level known to a tenth.
+-- | A level as the robot reads it: rounded to a tenth, then down to a whole percent.
 wholePercent :: Double -> Int
 wholePercent percent = round (percent * 10) `div` 10
 
--- | The battery, from this moment on with another level.
+-- | The battery with another level from this moment on.
 withLevel :: Seconds -> Double -> Battery -> Battery
 withLevel t percent b = b {level = percent, since = t}
 
--- | The battery, from this moment on with another rate; but an empty one stays empty.
+-- | The battery with another rate from this moment on; an empty battery stays empty.
 withRate :: Seconds -> Double -> Battery -> Battery
 withRate t percentASecond b =
   Battery {level = levelNow, rate = if levelNow > 0 then percentASecond else 0, since = t}
@@ -50,7 +50,7 @@ withRate t percentASecond b =
 filled :: Battery -> Battery
 filled b = b {level = 100}
 
--- | How long it lasts from this moment on: until it is empty.
+-- | How long it takes from this moment on until the battery is empty.
 lasts :: Seconds -> Battery -> Seconds
 lasts t b
   | left <= 0 = 0
@@ -59,7 +59,7 @@ lasts t b
  where
   left = levelAt t b
 
--- | How long it takes from this moment on until it is full.
+-- | How long it takes from this moment on until the battery is full.
 untilFull :: Seconds -> Battery -> Seconds
 untilFull t b
   | missing <= 0 = 0

@@ -1,8 +1,8 @@
 -- |
--- What the robot can do and perceive, by the names and types that the paper uses.
+-- What the robot can do and perceive, with the names and types of the paper.
 --
--- The paper's listings are closed definitions, so all of this acts in one world of
--- the whole process: the one that 'inWorld' sets.
+-- The paper's listings are closed definitions. So all of this acts in one global world of
+-- the process, which 'inWorld' sets.
 module Robot
   ( inWorld
 
@@ -63,7 +63,7 @@ import Behavior
 import Behavior.STM (STM, modifyTVar', readTVar, readTVarIO, writeTVar)
 import World
 
--- | Runs the action with this world for all that is in this module.
+-- | Runs the action with this world as the world of this module.
 inWorld :: World -> IO a -> IO a
 inWorld world act = bracket (exchange (Just world)) (writeIORef currentWorld) (const act)
  where
@@ -80,7 +80,7 @@ theWorld = readIORef currentWorld >>= maybe (error "Robot: there is no world; se
 acting :: String -> (World -> STM (Either String a)) -> Behavior a
 acting name effect = theWorld >>= \world -> perform world name (effect world)
 
--- | An action that takes its time and changes nothing that anybody could see.
+-- | An action that takes time and has no effect on the world.
 idly :: String -> Behavior ()
 idly name = acting name (\_ -> pure (Right ()))
 
@@ -91,7 +91,7 @@ frontDoor, backDoor :: Door
 frontDoor = FrontDoor
 backDoor = BackDoor
 
--- | The door of those listings that know of only one.
+-- | The door of the listings that have only one.
 door :: Door
 door = frontDoor
 
@@ -114,7 +114,7 @@ open d = acting ("open " ++ doorName d) $ \world -> do
     Locked -> remains "locked"
     Sealed -> remains "sealed"
 
--- | To the other side of the door, whichever that is.
+-- | Passes to the other side of the door: into the room or out of it.
 passThrough :: Door -> Behavior ()
 passThrough d = acting ("pass through " ++ doorName d) $ \world -> do
   state <- readTVar (doorIs world d)
@@ -133,7 +133,7 @@ smash d = acting ("smash " ++ doorName d) $ \world -> do
     then pure (Left ("the " ++ doorName d ++ " is sealed"))
     else succeeding (writeTVar (doorIs world d) Open)
 
--- | Percent, from 0 to 100.
+-- | The level of the battery: percent, from 0 to 100.
 batteryLevel, battery :: Behavior Int
 batteryLevel = theWorld >>= fmap wholePercent . batteryNow
 battery = batteryLevel
@@ -143,7 +143,7 @@ batteryLow = do
   world <- theWorld
   (< threshold (setting world)) <$> batteryLevel
 
--- | Until the battery is full. The charger is outside the room.
+-- | Recharges until the battery is full. The charger is outside the room.
 recharge :: Behavior ()
 recharge = do
   world <- theWorld
@@ -176,7 +176,7 @@ turn = idly "turn"
 moveForward = idly "move forward"
 circle = idly "circle"
 
--- | Until the danger has passed.
+-- | Hides until the danger has passed.
 hide :: Behavior ()
 hide = acting "hide" (\world -> succeeding (writeTVar (holds world DangerNearby) False))
 

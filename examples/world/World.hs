@@ -1,11 +1,11 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- A world of two doors, a room behind them, and a robot with a battery. It stands in
--- for the hardware of a real robot: in the executables its actions take time, in
--- tests they are what the test wants them to be.
+-- A world of two doors, a room behind them, and a robot with a battery. It takes the
+-- place of the hardware of a real robot: in the executables its actions take time, in
+-- tests the test defines what they do.
 --
--- What the robot can do in it has its names, those of the paper, in "Robot".
+-- "Robot" defines the robot's actions, with the names of the paper.
 module World
   ( -- * What a world is made of
     Setting (..)
@@ -76,23 +76,23 @@ import Behavior.STM
 import Behavior.Time (now)
 import WorldChange
 
--- | How a world is at first, and what holds in it.
+-- | The initial state of a world, and its constants.
 data Setting = Setting
   { frontIs :: DoorState
   , backIs :: DoorState
   , chargedTo :: Double
   -- ^ The level of the battery: percent.
   , drain :: Double
-  -- ^ What the battery loses while it is not being charged: percent a second.
+  -- ^ How fast the battery drains while it is not being charged: percent per second.
   , gain :: Double
-  -- ^ What it gains while it is: percent a second.
+  -- ^ How fast it fills while it is being charged: percent per second.
   , threshold :: Int
   -- ^ Below this level the battery is low: percent.
   , speed :: Double
-  -- ^ How many seconds of the world pass in a real one.
+  -- ^ How many seconds of the world pass in a real second.
   , lasting :: World -> String -> Behavior ()
-  -- ^ How long the action of this name takes, and what else happens meanwhile. The
-  -- action has its effect when this has returned; if this throws, it has none.
+  -- ^ Runs for as long as the action of this name takes. The action has its effect when
+  -- this has returned; if this throws, the action has no effect.
   }
 
 -- | Closed doors, a full battery that does not drain, and actions that take no time.
@@ -120,15 +120,15 @@ doorName = \case
 data DoorState
   = Open
   | Closed
-  | -- | To open it fails; to smash it works.
+  | -- | Opening it fails; smashing it works.
     Locked
-  | -- | So many tries to open it fail.
+  | -- | This number of tries to open it fail.
     Jammed Natural
   | -- | Neither works.
     Sealed
   deriving (Eq, Ord, Show)
 
--- | What can hold in a world, apart from what its doors and battery say.
+-- | The conditions of a world, apart from those of its doors and battery.
 data Condition = InsideRoom | CloseToWall | DangerNearby | C1 | C2 | C3
   deriving (Eq, Ord, Show, Enum, Bounded)
 
@@ -137,7 +137,7 @@ data World = World
   , began :: Seconds
   , doorIs :: Door -> TVar DoorState
   , holds :: Condition -> TVar Bool
-  -- ^ At first no condition holds.
+  -- ^ Initially no condition holds.
   , battery :: TVar Battery
   , history :: TVar (Seq WorldChange)
   }
@@ -160,16 +160,16 @@ newWorld s = do
       , history = past
       }
 
--- | The time of the world, since it began.
+-- | The time of the world, in seconds since it began.
 clock :: World -> Behavior Seconds
 clock world = (\t -> (t - began world) * pace world) <$> now
 
--- | Waits for so many seconds of the world.
+-- | Waits for the given number of seconds of the world.
 wait :: World -> Seconds -> Behavior ()
 wait world seconds = sleep (seconds / pace world)
 
--- | For 'lasting': recharging takes until the battery is full, every other action as
--- long as this says.
+-- | For 'lasting': recharging takes until the battery is full, every other action the
+-- given time.
 taking :: Behavior Seconds -> World -> String -> Behavior ()
 taking seconds world name =
   wait world =<< if name == "recharge" then untilCharged world else seconds
@@ -179,15 +179,15 @@ pace = realToFrac . speed . setting
 
 -- | The level of the battery: percent.
 batteryNow :: World -> Behavior Double
-batteryNow = askBattery levelAt
+batteryNow = readBattery levelAt
 
--- | As if somebody had changed the battery for one of this level.
+-- | Replaces the battery by one with this level.
 setBattery :: World -> Double -> Behavior ()
 setBattery world percent = changeBattery world (`withLevel` percent)
 
 -- | How long it takes until the battery is full, at the rate at which it now charges.
 untilCharged :: World -> Behavior Seconds
-untilCharged = askBattery untilFull
+untilCharged = readBattery untilFull
 
 -- | Charges the battery while the behaviour runs.
 recharging :: World -> Behavior a -> Behavior a
@@ -195,45 +195,45 @@ recharging world = bracket_ (rate (gain (setting world))) (rate (negate (drain (
  where
   rate percentASecond = changeBattery world (`withRate` percentASecond)
 
--- | What recharging it comes to.
+-- | The effect of recharging.
 fillBattery :: World -> STM ()
 fillBattery world = modifyTVar' (battery world) filled
 
--- | Waits until the battery is flat, and throws that.
+-- | Waits until the battery is flat, then throws 'BatteryFlat'.
 flat :: World -> Behavior a
 flat world = Signal.switch (Signal.watching (readTVar (battery world))) $ \b -> do
   t <- clock world
   wait world (lasts t b)
   throwIO BatteryFlat
 
--- | A fault of the world: nothing that a robot could recover from.
+-- | A fault of the world, which the robot cannot recover from.
 data BatteryFlat = BatteryFlat
   deriving (Eq, Show)
 
 instance Exception BatteryFlat where
   displayException BatteryFlat = "the battery is flat"
 
-askBattery :: (Seconds -> Battery -> a) -> World -> Behavior a
-askBattery question world =
-  question <$> clock world <*> readTVarIO (battery world)
+readBattery :: (Seconds -> Battery -> a) -> World -> Behavior a
+readBattery property world =
+  property <$> clock world <*> readTVarIO (battery world)
 
 changeBattery :: World -> (Seconds -> Battery -> Battery) -> Behavior ()
 changeBattery world change =
   clock world >>= \t -> atomically (modifyTVar' (battery world) (change t))
 
--- | All that the robot does goes through here: the action begins, lasts as long as
--- the world says, and then has its effect, or fails for the reason that the effect
--- gives (what that has changed stays changed).
+-- | Performs an action; every action of the robot uses this. The action begins, lasts for
+-- the time that the world defines, and then has its effect, or fails with the reason that
+-- the effect returns (changes that the effect has made remain).
 perform :: World -> String -> STM (Either String a) -> Behavior a
 perform world name effect = mask $ \restore -> do
   record world name (const Begins) (pure ())
   restore (lasting (setting world) world name) `catch` \e -> do
     record world name (const (unfinished e)) (pure ())
     throwIO e
-  -- One transaction, and masked: it has been done if and only if it is on record.
+  -- One transaction, and masked: the effect was done if and only if it is recorded.
   record world name (either Fails (const Done)) effect >>= either failWith pure
 
--- | Puts what a transaction did to an action on record.
+-- | Runs a transaction and adds a change to the history, atomically.
 record :: World -> String -> (a -> ChangeKind) -> STM a -> Behavior a
 record world name how effect = do
   t <- clock world
@@ -256,16 +256,16 @@ unfinished e@(SomeException inner)
 happened :: World -> Behavior [WorldChange]
 happened world = toList <$> readTVarIO (history world)
 
--- | Tells every event while the behaviour runs, and has told all when it ends. The
--- robot does not wait for the telling.
+-- | Passes every change to the given function while the behaviour runs, and all remaining
+-- ones before it ends. The robot does not wait for that function.
 narrating :: World -> (WorldChange -> Behavior ()) -> Behavior a -> Behavior a
-narrating world tell act = do
-  told <- newTVarIO 0
+narrating world receive act = do
+  received <- newTVarIO 0
   let next = do
-        n <- readTVar told
-        event <- readTVar (history world) >>= maybe retry pure . Seq.lookup n
-        event <$ writeTVar told (n + 1)
-      -- Masked: an event that was taken is told.
-      telling = forever (mask_ (atomically next >>= tell))
-      others = atomically ((Just <$> next) `orElse` pure Nothing) >>= traverse_ (\e -> tell e >> others)
-  firstOf [act, telling] `finally` others
+        n <- readTVar received
+        change <- readTVar (history world) >>= maybe retry pure . Seq.lookup n
+        change <$ writeTVar received (n + 1)
+      -- Masked: a change that was taken is passed on.
+      passing = forever (mask_ (atomically next >>= receive))
+      others = atomically ((Just <$> next) `orElse` pure Nothing) >>= traverse_ (\change -> receive change >> others)
+  firstOf [act, passing] `finally` others

@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What can happen to an action of the robot.
+-- The changes of an action of the robot.
 module WorldChange
   ( WorldChange (..)
   , ChangeKind (..)
@@ -29,15 +29,15 @@ data ChangeKind
   | Done
   | -- | It could not be done, for this reason.
     Fails String
-  | -- | Somebody no longer wanted it, and it has stopped what it was doing.
+  | -- | It was cancelled, and has stopped.
     Interrupted
   | -- | Something else went wrong.
     Faults String
   deriving (Eq, Show)
 
--- | An event as one line of a report.
+-- | A change as one line of a report.
 describe :: WorldChange -> String
-describe event = line (time event) (charge event) (action event ++ ending (changeKind event))
+describe change = line (time change) (charge change) (action change ++ ending (changeKind change))
  where
   ending = \case
     Begins -> " ..."
@@ -46,7 +46,7 @@ describe event = line (time event) (charge event) (action event ++ ending (chang
     Interrupted -> ": interrupted, motors off"
     Faults what -> ": fault, " ++ what
 
--- | A line of a report: the time, the charge of the battery, and what there is to say.
+-- | A line of a report: the time, the charge of the battery, and a text.
 line :: Seconds -> Double -> String -> String
 line t percent what = column 7 seconds ++ " s  " ++ column 3 level ++ " %  " ++ what
  where

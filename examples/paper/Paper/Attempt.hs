@@ -1,8 +1,8 @@
 {-# LANGUAGE RebindableSyntax #-}
 {-# OPTIONS_GHC -w #-}
 
--- | Section 6: trying up to so many times. It never ends for a negative number, and it is not
--- the one that the fourth version calls: see the errata.
+-- | Section 6: tries a task up to the given number of times. It never ends for a negative
+-- number, and the fourth version calls another one: see the errata.
 module Paper.Attempt where
 
 import Behavior.Paper hiding (attempt)

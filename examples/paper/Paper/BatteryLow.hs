@@ -1,7 +1,7 @@
 {-# LANGUAGE RebindableSyntax #-}
 {-# OPTIONS_GHC -w #-}
 
--- | Section 6: a condition built from what another behaviour returns.
+-- | Section 6: a condition built from the result of another behaviour.
 module Paper.BatteryLow where
 
 import Behavior.Paper

@@ -9,6 +9,6 @@ import Robot
 
 bt = bhvr1 >>= bhvr2
 
--- What the listing leaves open:
+-- What the listing leaves undefined:
 bhvr1 = findBox
 bhvr2 = moveTo

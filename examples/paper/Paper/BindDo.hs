@@ -11,6 +11,6 @@ bt =
     do result <- bhvr1
        bhvr2 result
 
--- What the listing leaves open:
+-- What the listing leaves undefined:
 bhvr1 = findBox
 bhvr2 = moveTo

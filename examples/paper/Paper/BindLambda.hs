@@ -10,6 +10,6 @@ import Robot
 bt =
     bhvr1 >>= (\ result -> bhvr2 result)
 
--- What the listing leaves open:
+-- What the listing leaves undefined:
 bhvr1 = findBox
 bhvr2 = moveTo

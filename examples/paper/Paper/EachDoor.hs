@@ -1,7 +1,7 @@
 {-# LANGUAGE RebindableSyntax #-}
 {-# OPTIONS_GHC -w #-}
 
--- | Section 6, third version: over all doors that there are.
+-- | Section 6, third version: over all doors.
 module Paper.EachDoor where
 
 import Behavior.Paper

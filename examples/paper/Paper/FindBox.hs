@@ -1,7 +1,7 @@
 {-# LANGUAGE RebindableSyntax #-}
 {-# OPTIONS_GHC -w #-}
 
--- | Section 4, inline: what one behaviour returns is handed to the next.
+-- | Section 4, inline: the result of one behaviour is the argument of the next.
 module Paper.FindBox where
 
 import Behavior.Paper

@@ -1,7 +1,7 @@
 {-# LANGUAGE RebindableSyntax #-}
 {-# OPTIONS_GHC -w #-}
 
--- | Section 4: what one behaviour returns is given a name.
+-- | Section 4: the result of one behaviour gets a name.
 module Paper.FindBoxLambda where
 
 import Behavior.Paper

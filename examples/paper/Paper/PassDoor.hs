@@ -4,8 +4,8 @@
 -- | Section 3.1: a robot that passes through a door and closes it behind it, as nested
 -- reactive selections.
 --
--- The words are the paper's; the parentheses around the third argument of each
--- @rSelect@ are ours, without them it does not compile.
+-- The text is the paper's, except for the parentheses around the third argument of each
+-- @rSelect@: without them it does not compile.
 module Paper.PassDoor where
 
 import Behavior.Paper

@@ -10,7 +10,7 @@ import Robot
 
 bt = rSelect action1done action2 action1
 
--- What the expression leaves open:
+-- What the expression leaves undefined:
 action1 = a1
 action2 = a2
 action1done = c1

@@ -11,6 +11,6 @@ bt =
     do bhvr1
        bhvr2
 
--- What the listing leaves open:
+-- What the listing leaves undefined:
 bhvr1 = open door
 bhvr2 = passThrough door

@@ -1,7 +1,7 @@
 {-# LANGUAGE RebindableSyntax #-}
 {-# OPTIONS_GHC -w #-}
 
--- | Section 3.3, footnote: the same, more neatly. The paper gives the expression.
+-- | Section 3.3, footnote: the same, shorter. The paper gives the expression.
 module Paper.Unless where
 
 import Behavior.Paper

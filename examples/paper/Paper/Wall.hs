@@ -1,8 +1,7 @@
 {-# LANGUAGE RebindableSyntax #-}
 {-# OPTIONS_GHC -w #-}
 
--- | Section 3.3: an interruption that is needed. Moving forward does not itself know when
--- to stop.
+-- | Section 3.3: an interruption that is needed. Moving forward does not end by itself.
 module Paper.Wall where
 
 import Behavior.Paper

@@ -1,6 +1,6 @@
 -- |
 -- A small kit for your own tests: a mock world of scripted actions, conditions and
--- sensors, its record of what happened, and claims about that.
+-- sensors, a record of what happened in it, and claims about that record.
 --
 -- > it "goes to its charger before the battery is empty" $ do
 -- >   world    <- newMock
@@ -11,10 +11,11 @@
 -- >   world `shouldRecord` whenever (becoming "battery low" True) (withinSeconds 2 (startOf "recharge"))
 -- >   world `shouldRecord` never (running "tidy up" `overlapping` running "recharge")
 --
--- All of it works in a simulation, where waiting costs no time and every schedule can
--- be tried, and on real threads as well.
+-- All of it works in a simulation, where waiting costs no real time and every schedule
+-- can be tried, and on real threads as well.
 --
--- (It is @taking@ and @comesBefore@, not @after@ and @before@, since those are hspec's.)
+-- (The names are @taking@ and @comesBefore@, not @after@ and @before@, because hspec
+-- exports those.)
 module Behavior.Sim.Mock
   ( -- * A world
     Mock
@@ -39,7 +40,7 @@ module Behavior.Sim.Mock
   , taking
   , causing
 
-    -- ** What it does when it is asked to stop
+    -- ** What it does when its stop is requested
   , slowToStop
   , failsStopping
   , faultsStopping
@@ -55,7 +56,7 @@ module Behavior.Sim.Mock
   , set
   , clear
 
-    -- * What has happened
+    -- * The record
   , shouldRecord
   , BrokenClaim (..)
   , happened
@@ -91,7 +92,7 @@ module Behavior.Sim.Mock
   , overlapping
   , count
 
-    -- ** What goes on for a while
+    -- ** Intervals
   , Interval
   , running
   , being

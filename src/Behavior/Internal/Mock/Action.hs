@@ -32,16 +32,16 @@ import Behavior.Internal.Sim.Text
 -- >>> import Behavior.Sim.Mock
 -- >>> mock <- newMock
 
--- | Makes an action of this name, whose n-th call does what the n-th script says; the
--- last script repeats for ever.
+-- | Makes an action with the given name, whose n-th call follows the n-th script; the
+-- last script is used for all further calls.
 --
--- On record come its beginning, how it ends, and when it heard that it was to stop.
--- 'Succeeds' is on record if and only if the action returns. (A cancellation may
--- come right behind, as behind any action.) Which call gets which
--- script is exact, whoever calls at the same time.
+-- It records its beginning, its end, and the stop request if it receives one.
+-- 'Succeeds' is recorded if and only if the action returns. (A cancellation may
+-- arrive right after that, as after any action.) The n-th call takes the n-th script
+-- also when calls are concurrent.
 --
--- No script, or a name that something else in this world has, is refused with an
--- 'ErrorCall'.
+-- An empty list of scripts, or a name that is already used in this world, is rejected
+-- with an 'ErrorCall'.
 --
 -- >>> openDoor <- action mock "open door" [fails "locked", succeeds]
 -- >>> attempt 3 openDoor
@@ -58,7 +58,8 @@ action mock name scripts = do
   calls <- newIORef Map.empty
   pure (play mock (nextCall mock calls name "" scripts))
 
--- | 'action' with an argument: each argument has scripts, and calls, of its own.
+-- | 'action' with an argument: each argument has its own scripts and its own count of
+-- calls.
 --
 -- >>> let doors door = if door == "front" then [fails "locked"] else [returning door]
 -- >>> leaveBy <- actionOn mock "leave by" doors
@@ -72,16 +73,15 @@ actionOn mock name scripts = do
   registerName mock "action" name
   calls <- newIORef Map.empty
   pure $ \x -> do
-    -- Those of an argument can be checked only by one who has the argument.
+    -- The scripts of an argument can be checked only when the argument is known.
     checkScripts ("action " ++ show (name ++ " " ++ show x)) (scripts x)
     play mock (nextCall mock calls name (show x) (scripts x))
 
--- | Makes a sensor of this name, whose n-th reading does what the n-th script says; the
--- last script repeats for ever.
+-- | Makes a sensor with the given name, whose n-th reading follows the n-th script; the
+-- last script is used for all further readings.
 --
--- It is an 'action', but one that would fill the record: on record comes only what a
--- reading gives when that is not what the last one gave, and each reading that
--- fails or faults.
+-- It is like an 'action' but records less: a value only if it differs from the value
+-- before, and each reading that fails or faults.
 --
 -- >>> camera <- sensor mock "camera" [returning 3, fails "no picture", returning 5]
 -- >>> Signal.waitUntil ((== 5) <$> Signal.polling 0.001 (camera ? camera))
@@ -94,85 +94,85 @@ sensor mock name scripts = do
   registerName mock "sensor" name
   calls <- newIORef Map.empty
   newest <- newIORef Nothing
-  let say t what = recordEntry mock (RecordEntry t name "" 1 what)
-      telling =
-        Reporting
-          { says = \t what -> when (isTrouble what) (say t what)
-          , gives = \t a -> do
+  let write t kind = recordEntry mock (RecordEntry t name "" 1 kind)
+      recorder =
+        Recorder
+          { recordKind = \t kind -> when (isFailed kind) (write t kind)
+          , recordResult = \t a -> do
               let value = Just (show a)
               old <- atomicModifyIORef' newest (\old -> (value, old))
-              unless (value == old) (traverse_ (say t . Becomes) value)
+              unless (value == old) (traverse_ (write t . Becomes) value)
           }
   pure . play mock $ do
-    (_, script) <- takeTurn calls "" scripts
-    pure (script, telling)
+    (_, script) <- nextScript calls "" scripts
+    pure (script, recorder)
  where
-  isTrouble what = case what of
+  isFailed kind = case kind of
     Fails _ -> True
     Faults _ -> True
     _ -> False
 
--- | How a call puts on record what happens to it.
-data Reporting a = Reporting
-  { says :: Seconds -> EntryKind -> IO ()
-  , gives :: Seconds -> a -> IO ()
-  -- ^ It returns this.
+-- | How a call records what it does.
+data Recorder a = Recorder
+  { recordKind :: Seconds -> EntryKind -> IO ()
+  -- ^ Everything except a result.
+  , recordResult :: Seconds -> a -> IO ()
   }
 
--- | The number of the next call with each argument, and the scripts from there on.
+-- | For each argument the number of its next call, and the scripts from that call on.
 type Calls a = IORef (Map String (Int, [Script a]))
 
--- | The script whose turn it is, and how to tell of it.
-nextCall :: Mock -> Calls a -> String -> String -> [Script a] -> IO (Script a, Reporting a)
+-- | The script of the next call of an action, and how that call is recorded.
+nextCall :: Mock -> Calls a -> String -> String -> [Script a] -> IO (Script a, Recorder a)
 nextCall mock calls name x scripts = do
-  (n, script) <- takeTurn calls x scripts
-  let say t what = recordEntry mock (RecordEntry t name x n what)
-  pure (script, Reporting {says = say, gives = \t _ -> say t Succeeds})
+  (n, script) <- nextScript calls x scripts
+  let write t kind = recordEntry mock (RecordEntry t name x n kind)
+  pure (script, Recorder {recordKind = write, recordResult = \t _ -> write t Succeeds})
 
--- | Takes the number of the call and its script, in one step, whoever calls at the
--- same time.
-takeTurn :: Calls a -> String -> [Script a] -> IO (Int, Script a)
-takeTurn calls x scripts = atomicModifyIORef' calls $ \old ->
-  let (new, turn) = next (Map.findWithDefault (1, scripts) x old) in (Map.insert x new old, turn)
+-- | Takes the number of the call and its script, atomically.
+nextScript :: Calls a -> String -> [Script a] -> IO (Int, Script a)
+nextScript calls x scripts = atomicModifyIORef' calls $ \old ->
+  let (new, taken) = next (Map.findWithDefault (1, scripts) x old) in (Map.insert x new old, taken)
  where
   next (n, script : others) = ((n + 1, if null others then [script] else others), (n, script))
   next (_, []) = errorWithoutStackTrace "unreachable: no script"
 
 -- | Plays one call.
-play :: Mock -> IO (Script a, Reporting a) -> Behavior a
+play :: Mock -> IO (Script a, Recorder a) -> Behavior a
 play mock next = do
-  -- Here, while the time is asked for, a cancellation comes before all else.
+  -- A cancellation that arrives here, where the time is read, takes no script and
+  -- leaves no entry.
   (zero, begun) <- clock mock
   mask $ \restore -> do
-    (script, telling) <- next
+    (script, recorder) <- next
     let present = (\(_, t) -> t - zero) <$> clock mock
-        say what = present >>= \t -> says telling t what
+        write kind = present >>= \t -> recordKind recorder t kind
         itsTime = pass (lasts script) begun
         finish = do
           caused <- try (effect script)
           case caused >> end script of
-            Left e -> say (ending e) >> throwIO e
-            -- From the record to the end there is no operation of the seam.
-            Right a -> present >>= \t -> a <$ gives telling t a
+            Left e -> write (ending e) >> throwIO e
+            -- Between this entry and the end of the call there is no operation of the seam.
+            Right a -> present >>= \t -> a <$ recordResult recorder t a
         cleanUp seconds instead e = do
           when (seconds > 0) $ now >>= uninterruptibleMask_ . pass seconds
-          say (maybe Stops ending instead)
+          write (maybe Stops ending instead)
           throwIO (fromMaybe e instead)
-    says telling (begun - zero) Begins
-    try (restore itsTime) >>= \heard -> case (heard, stopping script) of
+    recordKind recorder (begun - zero) Begins
+    try (restore itsTime) >>= \waited -> case (waited, stopping script) of
       (Right (), _) -> finish
-      (Left e, CleansUp seconds instead) -> say StopRequested >> cleanUp seconds instead (e :: SomeException)
-      (Left _, GoesOn) -> say StopRequested >> uninterruptibleMask_ itsTime >> finish
+      (Left e, CleansUp seconds instead) -> write StopRequested >> cleanUp seconds instead (e :: SomeException)
+      (Left _, GoesOn) -> write StopRequested >> uninterruptibleMask_ itsTime >> finish
 
--- | Lets so many seconds pass from a moment on. Even if there are none, it is a
--- point where a cancellation can arrive.
+-- | Waits until the given number of seconds have passed since a moment. A cancellation
+-- can arrive there, even if the number is zero.
 pass :: Seconds -> Seconds -> IO ()
 pass seconds since
   | seconds <= 0 = checkpoint
   | isInfinite (realToFrac seconds :: Double) = atomically retry
   | otherwise = sleepUntil (since + seconds)
 
--- | What is to be said of an end with this exception.
+-- | How an end with this exception is recorded.
 ending :: SomeException -> EntryKind
 ending e
   | isCancellation e = Stops
@@ -182,10 +182,10 @@ ending e
   reason (FailedBecause why) = why
   reason Failed = "for no reason given"
 
--- | Refuses what can be no script for an action. Of endlessly many only so many can be
--- looked at beforehand.
+-- | Rejects an empty list and invalid scripts. The list may be infinite, so only its
+-- first 1000 scripts are checked.
 checkScripts :: String -> [Script a] -> IO ()
-checkScripts who scripts = do
+checkScripts owner scripts = do
   when (null scripts) . throwIO . ErrorCall $
-    who ++ ": at least one script is needed; the last one repeats for ever"
-  traverse_ (checkScript who) (take 1000 scripts)
+    owner ++ ": at least one script is needed; the last one repeats for ever"
+  traverse_ (checkScript owner) (take 1000 scripts)

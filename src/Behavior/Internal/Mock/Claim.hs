@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Claims about what has happened in a mock world.
+-- Claims about the record of a mock world.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Claim
@@ -14,7 +14,7 @@ module Behavior.Internal.Mock.Claim
   , comesBefore
   , whenever
 
-    -- * Judging
+    -- * Checking
   , holds
   , verdict
   ) where
@@ -30,34 +30,36 @@ import Behavior.Internal.Runtime (Seconds)
 -- $setup
 -- >>> import Behavior.Sim.Mock
 -- >>> import Behavior.Internal.Mock.Record
--- >>> let line s who = RecordEntry s who "" 1
--- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" AskedToStop, line 5 "drive" Stops]
+-- >>> let line s name = RecordEntry s name "" 1
+-- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" StopRequested, line 5 "drive" Stops]
 -- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
 -- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
 -- >>> let check claim = either putStr pure (verdict claim record)
 
--- | What is said of a record. Two claims joined by '<>' hold when both do.
+-- | A claim about a record. Two claims joined by '<>' hold when both hold.
 --
--- These are the patterns in which properties are mostly specified (Dwyer, Avrunin and
+-- The claims are the most common patterns of specifications (Dwyer, Avrunin and
 -- Corbett, /Patterns in property specifications for finite-state verification/):
 -- existence, absence, bounded existence, universality, precedence and response. A
--- record is all that happened: what is not on it has not come in time.
+-- record is complete: what is not in it has not happened in time.
 --
 -- @since 0.1.0.0
 data Claim = Claim
   { claimWords :: String
   , claimNames :: [String]
-  , broken :: Lines -> Origin -> Maybe (String, Lines)
-  -- ^ Why it does not hold of what comes after the origin, and what entries show it.
+  , violation :: Lines -> Origin -> Maybe (String, Lines)
+  -- ^ If it does not hold for the entries after the origin: why not, and the entries that
+  -- show it.
   }
 
--- | The entry from which a claim is made (the beginning comes before entry 0).
+-- | The entry after which a claim is checked, and its time. (For the whole record the
+-- entry is -1.)
 data Origin = Origin Int Seconds
 
 instance Semigroup Claim where
   a <> b =
     Claim (intercalate ", and " (filter (not . null) [claimWords a, claimWords b])) (claimNames a ++ claimNames b) $
-      \rows origin -> broken a rows origin <|> broken b rows origin
+      \rows origin -> violation a rows origin <|> violation b rows origin
 
 instance Monoid Claim where
   mempty = Claim "" [] (\_ _ -> Nothing)
@@ -68,8 +70,8 @@ instance Monoid Claim where
 eventually :: Moment -> Claim
 eventually = withinSeconds (1 / 0)
 
--- | It happens within so many seconds (to a microsecond): from the beginning, or
--- under 'whenever' from then on. A negative number or NaN is refused with an
+-- | It happens within the given number of seconds (to a microsecond): from the beginning,
+-- or under 'whenever' from that moment on. A negative number or NaN is rejected with an
 -- 'Control.Exception.ErrorCall'.
 --
 -- >>> check (whenever (becoming "low" True) (withinSeconds 0.5 (startOf "charge")))
@@ -78,7 +80,7 @@ eventually = withinSeconds (1 / 0)
 --     0.0 s  low: is False
 --     0.0 s  drive: begins
 --   > 4.0 s  low: becomes True
---     4.0 s  drive: is asked to stop
+--     4.0 s  drive: stop requested
 --     5.0 s  drive: has stopped
 --   > 5.0 s  charge: begins
 --     9.0 s  charge: done
@@ -105,32 +107,32 @@ never m = claimOf ("never " ++ momentWords m) m $ \_ found -> case found of
   [] -> Nothing
   row : _ -> Just ("it was so at " ++ inSeconds (time row), [row])
 
--- | It happens exactly so many times.
+-- | It happens exactly the given number of times.
 --
 -- @since 0.1.0.0
 exactly :: Int -> Moment -> Claim
 exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords m) m $ \_ found ->
   if length found == times then Nothing else Just ("it was so " ++ show (length found) ++ " times", found)
 
--- | It goes on all the time: whenever anything happens.
+-- | The interval is going on at every entry (the initial values of conditions excepted).
 --
 -- >>> holds (whenever (startOf "charge") (always (being "low" True))) record
 -- True
 --
 -- @since 0.1.0.0
 always :: Interval -> Claim
-always s = Claim ("always " ++ spanWords s) (spanNames s) $ \rows (Origin origin _) ->
-  let isInside n = any (\(from, to) -> from <= n && n < to) (stretches s rows)
-   in case [row | row@(n, entry) <- rows, n > origin, not (setting entry || isInside n)] of
+always s = Claim ("always " ++ intervalWords s) (intervalNames s) $ \rows (Origin origin _) ->
+  let isInside n = any (\(from, to) -> from <= n && n < to) (intervalRanges s rows)
+   in case [row | row@(n, entry) <- rows, n > origin, not (isInitial entry || isInside n)] of
         [] -> Nothing
         row : _ -> Just ("it was not so at " ++ inSeconds (time row), [row])
  where
-  -- While the world is being set up, not all of it is there yet.
-  setting entry = case entryKind entry of
+  -- The entries that the set-up of the world makes: not everything exists yet.
+  isInitial entry = case entryKind entry of
     Is _ -> True
     _ -> False
 
--- | The second does not happen before the first has: @startOf "look" \`comesBefore\`
+-- | The second does not happen before the first has happened: @startOf "look" \`comesBefore\`
 -- startOf "cross"@. It holds when the second never happens.
 --
 -- >>> check (startOf "charge" `comesBefore` endOf "drive")
@@ -138,7 +140,7 @@ always s = Claim ("always " ++ spanWords s) (spanNames s) $ \rows (Origin origin
 -- The second came at 5.0 s, without the first:
 --     ...
 --     4.0 s  low: becomes True
---     4.0 s  drive: is asked to stop
+--     4.0 s  drive: stop requested
 --   > 5.0 s  drive: has stopped
 --     5.0 s  charge: begins
 --     9.0 s  charge: done
@@ -155,7 +157,7 @@ comesBefore a b =
 
 infix 7 `comesBefore`
 
--- | Each time that it happens, the claim holds of what comes after.
+-- | Each time that it happens, the claim holds for what comes after.
 --
 -- > whenever (becoming "low" True) (eventually (startOf "charge"))
 -- > whenever (becoming "low" True) (withinSeconds 2 (startOf "charge"))
@@ -168,7 +170,7 @@ whenever m claim =
     case [ ("from " ++ inSeconds (time row) ++ " on, " ++ why, row : seen)
          | row@(n, _) <- occurrences m rows
          , n > origin
-         , Just (why, seen) <- [broken claim rows (Origin n (time row))]
+         , Just (why, seen) <- [violation claim rows (Origin n (time row))]
          ] of
       [] -> Nothing
       first : _ -> Just first
@@ -176,15 +178,14 @@ whenever m claim =
   words' = "whenever " ++ momentWords m ++ ", " ++ claimWords claim
 
 claimOf :: String -> Moment -> (Origin -> Lines -> Maybe (String, Lines)) -> Claim
-claimOf words' m judge = Claim words' (momentNames m) $ \rows origin@(Origin after _) ->
-  judge origin (filter ((> after) . fst) (occurrences m rows))
+claimOf words' m check = Claim words' (momentNames m) $ \rows origin@(Origin after _) ->
+  check origin (filter ((> after) . fst) (occurrences m rows))
 
 time :: (Int, RecordEntry) -> Seconds
 time = entryTime . snd
 
--- | Whether a claim holds, to be said as hspec says it:
--- @record \`shouldSatisfy\` holds claim@. ('Behavior.Sim.Mock.shouldRecord' says why
--- it does not.)
+-- | Whether a claim holds. With hspec: @record \`shouldSatisfy\` holds claim@.
+-- ('Behavior.Sim.Mock.shouldRecord' also gives the reason if it does not.)
 --
 -- @since 0.1.0.0
 holds :: Claim -> Record -> Bool
@@ -192,8 +193,7 @@ holds claim = either (const False) (const True) . verdict claim
 
 -- | Why a claim does not hold, with the lines of the record that show it.
 --
--- A claim about a name that nothing in the world bears does not hold: else a slip of
--- the pen would make 'never' true.
+-- A claim about an unknown name does not hold; otherwise a typo would make 'never' true.
 --
 -- >>> check (never (startOf "chrage"))
 -- This does not hold: never "chrage" begins.
@@ -201,20 +201,20 @@ holds claim = either (const False) (const True) . verdict claim
 --
 -- @since 0.1.0.0
 verdict :: Claim -> Record -> Either String ()
-verdict claim record = case (strangers, broken claim (numbered record) (Origin (-1) 0)) of
+verdict claim record = case (unknown, violation claim (numbered record) (Origin (-1) 0)) of
   (name : _, _) ->
     refuted ("Nothing in this world is called " ++ show name ++ ", only " ++ commas (map show (subjects record)) ++ ".") []
   ([], Just (why, seen)) -> refuted (capital why ++ if null (entries record) then "." else ":") (excerpt (map fst seen) (entries record))
   ([], Nothing) -> Right ()
  where
-  strangers = [name | name <- claimNames claim, not (any (`names` name) (subjects record))]
+  unknown = [name | name <- claimNames claim, not (any (`names` name) (subjects record))]
   names known name = known == name || (known ++ " ") `isPrefixOf` name
   commas = intercalate ", "
   refuted why shown = Left (unlines (("This does not hold: " ++ claimWords claim ++ ".") : why : shown))
   capital why = map toUpper (take 1 why) ++ drop 1 why
 
--- | The lines that show something, marked, each with a few around it; when none
--- does, the last ones.
+-- | The given lines, marked, each with the two before and after it; if none are given,
+-- the last lines.
 excerpt :: [Int] -> [RecordEntry] -> [String]
 excerpt seen rows = gaps 0 [(n, marked n line) | (n, line) <- zip [0 ..] (timeline rows), near n]
  where

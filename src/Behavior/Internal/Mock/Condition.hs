@@ -1,9 +1,9 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Scripted conditions. No thread of its own changes one: whoever looks at it first
--- makes the changes that are due, and who watches it wakes for each. So no thread
--- outlives the operator that watches.
+-- Scripted conditions. A condition has no thread of its own: each access first makes the
+-- changes that are due, and an operator that watches it has a worker that wakes at each
+-- change. So no thread outlives the operator.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Condition
@@ -34,8 +34,8 @@ import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..)
 -- >>> import Behavior.Sim.Mock
 -- >>> mock <- newMock
 
--- | Something in the world that changes, by itself at certain times, or because
--- somebody 'set's it.
+-- | A value in the world that changes: by itself at scripted times, and by 'set' and
+-- 'clear'.
 --
 -- @since 0.1.0.0
 data Condition a = Condition
@@ -44,20 +44,20 @@ data Condition a = Condition
   , current :: TVar (Maybe a)
   , ahead :: TVar [(Seconds, Maybe a)]
   -- ^ The changes to come.
-  , says :: Maybe a -> Maybe a -> [EntryKind]
-  -- ^ What to say of a change from one to the other.
+  , changeKinds :: Maybe a -> Maybe a -> [EntryKind]
+  -- ^ How a change from the first value to the second is recorded.
   }
 
--- | Makes a condition of this name, that has these values from these times on: in
--- seconds since the clock of the world was started (see 'begin'), zero or more, and
--- increasing. A value for time 0 is there from the start; before the first
--- there is no value.
+-- | Makes a condition with the given name, which has each value from the given time on:
+-- in seconds since the clock of the world was started (see 'begin').
+-- The times are zero or more, and increase. A value for time 0 is there from the start;
+-- before the first time there is no value.
 --
--- Who watches its 'signal' or polls its 'reading' needs nothing else to make time
--- pass for it. Its changes are on record at the times at which they were due.
+-- To watch its 'signal' or to poll its 'reading' is enough: nothing else has to run for
+-- its changes to happen. They are recorded with the times at which they were due.
 --
--- Times that do not increase, or a name that something else in this world has, are
--- refused with an 'ErrorCall'.
+-- Times that do not increase, or a name that is already used in this world, are
+-- rejected with an 'ErrorCall'.
 --
 -- >>> low <- condition mock "battery low" [(0, False), (0.001, True)]
 -- >>> Signal.waitUntil (signal low)
@@ -70,7 +70,7 @@ data Condition a = Condition
 condition :: Show a => Mock -> String -> [(Seconds, a)] -> IO (Condition a)
 condition mock name = partialCondition mock name . map (fmap Just)
 
--- | A 'condition' that at times has no value ('Nothing').
+-- | A 'condition' that has no value at some times ('Nothing').
 --
 -- >>> beacon <- partialCondition mock "beacon" [(0, Just 'a'), (0.001, Nothing)]
 -- >>> Signal.waitUntil ((== 'b') <$> signal beacon)
@@ -79,14 +79,14 @@ condition mock name = partialCondition mock name . map (fmap Just)
 -- @since 0.1.0.0
 partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
 partialCondition mock name changes = do
-  -- Of endlessly many only so many can be looked at beforehand.
+  -- The list may be infinite, so only its first 1000 times are checked.
   for_ (zip (Nothing : map Just times) (take 1000 times)) $ uncurry checkTime
   registerName mock "condition" name
   first <- newTVarIO (initial >>= snd)
   rest <- newTVarIO (if isJust initial then drop 1 changes else changes)
-  let c = Condition mock name first rest told
+  let c = Condition mock name first rest kinds
   for_ (initial >>= snd) $ \a -> recordEntry mock (entry c 0 (Is (show a)))
-  registerPending mock $ \until' -> (\(_, _, said) -> said) <$> due c (<= until')
+  registerPending mock $ \until' -> (\(_, _, made) -> made) <$> due c (<= until')
   pure c
  where
   initial = listToMaybe [(t, a) | (t, a) <- take 1 changes, t == 0]
@@ -96,68 +96,68 @@ partialCondition mock name changes = do
       "condition " ++ show name ++ ": the times of the changes start from zero and increase; "
         ++ show t
         ++ maybe " is no such time" (\b -> " must not come after " ++ show b) before
-  told old new
+  kinds old new
     | fmap show old == fmap show new = []
     | otherwise = [maybe LosesValue (Becomes . show) new]
 
 entry :: Condition a -> Seconds -> EntryKind -> RecordEntry
 entry c t = RecordEntry t (nameOf c) "" 1
 
--- | The changes ahead whose time has come: what then is the value, what is still to
--- come, and what is to be put on record.
+-- | Applies the changes that are due: gives the value after them, the changes still
+-- ahead, and the record entries of those applied.
 due :: Condition a -> (Seconds -> Bool) -> STM (Maybe a, [(Seconds, Maybe a)], [RecordEntry])
 due c hasCome = do
   old <- readTVar (current c)
   (passed, others) <- span (hasCome . fst) <$> readTVar (ahead c)
   let steps = zip (old : map snd passed) passed
-      said = [entry c t what | (from, (t, to)) <- steps, what <- says c from to]
-  pure (foldl (\_ (_, to) -> to) old passed, others, said)
+      made = [entry c t kind | (from, (t, to)) <- steps, kind <- changeKinds c from to]
+  pure (foldl (\_ (_, to) -> to) old passed, others, made)
 
--- | Asks for the time, makes the changes that are due, then runs the transaction, all
--- in one step. (The transaction does not wait; so, masked, it is not interrupted
--- before all is on record.) It is told when the world began, and what time it is.
+-- | Reads the time, makes the changes that are due and runs the transaction, in one
+-- step. The transaction gets the time at which the world began and the current time; it
+-- must not block, so that, masked, nothing interrupts it before all is recorded.
 upToDate :: Condition a -> (Seconds -> Seconds -> STM (b, [RecordEntry])) -> IO b
 upToDate c transaction = do
   (zero, t) <- clock (world c)
   mask_ $ do
-    (b, said) <- atomically $ do
-      -- Added, as for who sleeps until then: a difference could be rounded to less.
-      (new, others, said) <- due c (\s -> zero + s <= t)
+    (b, made) <- atomically $ do
+      -- The same sum as the worker sleeps until: t - zero could be rounded to less than s.
+      (new, others, made) <- due c (\s -> zero + s <= t)
       writeTVar (current c) new >> writeTVar (ahead c) others
       (b, more) <- transaction zero t
-      pure (b, said ++ more)
-    traverse_ (recordEntry (world c)) said
+      pure (b, made ++ more)
+    traverse_ (recordEntry (world c)) made
     pure b
 
--- | The condition as a signal, to be watched: it wakes its operator at each change.
+-- | The condition as a signal: it wakes the operator that watches it at each change.
 --
 -- > reading c  and  signal c  have the same values at the same times
 --
--- Like every signal it waits for its first value, and fails its operator when the
--- value is lost.
+-- Like every signal it waits for its first value, and fails its operator when there is
+-- no value any more.
 --
 -- @since 0.1.0.0
 signal :: Condition a -> Signal a
 signal c = Signal $ \_ -> do
   changesByItself <- upToDate c (\_ _ -> (,) . not . null <$> readTVar (ahead c) <*> pure [])
-  -- A clock that was stopped for a while has slept through changes: until it has made
-  -- them, nobody may look.
-  made <- newTVarIO True
+  -- A worker that is started again after a while has missed changes: until it has made
+  -- them, reads of the signal block.
+  caughtUp <- newTVarIO True
   let wake = do
         next <- upToDate c $ \zero _ -> do
-          writeTVar made True
+          writeTVar caughtUp True
           changes <- readTVar (ahead c)
           pure (listToMaybe [zero + s | (s, _) <- changes], [])
         maybe (pure ()) (\s -> sleepUntil s >> wake) next -- (in constant stack; 'for_' is not)
-      valueOr none = (readTVar made >>= check) >> readTVar (current c) >>= maybe none pure
+      valueOr none = (readTVar caughtUp >>= check) >> readTVar (current c) >>= maybe none pure
       noneAnyMore = failWith (nameOf c ++ " has no value any more")
   pure
     (fromView (pure (View (valueOr retry) (valueOr noneAnyMore))))
-      { workers = [Worker "clock" (const wake <$ writeTVar made False) | changesByItself]
+      { workers = [Worker "clock" (const wake <$ writeTVar caughtUp False) | changesByItself]
       }
 
--- | The condition as a reading, to be polled: what it is now. It fails when there is no
--- value.
+-- | The condition as a reading, to be polled: its current value. It fails when there is
+-- no value.
 --
 -- >>> warm <- condition mock "warm" [(0, True)]
 -- >>> rSelect (reading warm) (pure "swim") (pure "run")
@@ -169,8 +169,8 @@ reading c =
   upToDate c (\_ _ -> (,) <$> readTVar (current c) <*> pure [])
     >>= maybe (failWith (nameOf c ++ " has no value")) pure
 
--- | Changes the condition now. The changes that it is still to make by itself, it
--- makes.
+-- | Changes the condition now. The scripted changes that are still ahead happen
+-- nevertheless.
 --
 -- >>> wet <- condition mock "wet" [(0, False)]
 -- >>> set wet True
@@ -181,7 +181,7 @@ reading c =
 set :: Condition a -> a -> Behavior ()
 set c = change c . Just
 
--- | Takes the value away, as from a sensor that has died.
+-- | Removes the value, as when a sensor has stopped working.
 --
 -- >>> gps <- condition mock "gps" [(0, "at home")]
 -- >>> clear gps
@@ -196,4 +196,4 @@ change :: Condition a -> Maybe a -> Behavior ()
 change c new = upToDate c $ \zero t -> do
   old <- readTVar (current c)
   writeTVar (current c) new
-  pure ((), [entry c (t - zero) what | what <- says c old new])
+  pure ((), [entry c (t - zero) kind | kind <- changeKinds c old new])

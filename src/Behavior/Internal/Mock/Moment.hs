@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What can be pointed at in a record: moments, and what goes on for a while.
+-- The parts of a record that claims are about: moments and intervals.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Moment
@@ -24,7 +24,7 @@ module Behavior.Internal.Mock.Moment
   , overlapping
   , count
 
-    -- * Spans
+    -- * Intervals
   , Interval (..)
   , running
   , being
@@ -38,8 +38,8 @@ import Behavior.Internal.Mock.Record
 -- $setup
 -- >>> import Behavior.Sim.Mock
 -- >>> import Behavior.Internal.Mock.Record
--- >>> let line s who = RecordEntry s who "" 1
--- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" AskedToStop, line 5 "drive" Stops]
+-- >>> let line s name = RecordEntry s name "" 1
+-- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" StopRequested, line 5 "drive" Stops]
 -- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
 -- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
 -- >>> let check claim = either putStr pure (verdict claim record)
@@ -47,7 +47,8 @@ import Behavior.Internal.Mock.Record
 -- | The entries of a record, numbered from 0.
 type Lines = [(Int, RecordEntry)]
 
--- | What kind of thing may have happened, once or often: @startOf "recharge"@.
+-- | A kind of record entry, of which there may be none, one or many:
+-- @startOf "recharge"@.
 --
 -- @since 0.1.0.0
 data Moment = Moment
@@ -56,14 +57,14 @@ data Moment = Moment
   , occurrences :: Lines -> Lines
   }
 
--- | The action begins. For an action with an argument the name alone means whatever
--- argument, and @"open \\"front\\""@ that one.
+-- | The action begins. For an action with an argument the name alone means any argument,
+-- and @"open \\"front\\""@ means this one.
 --
 -- @since 0.1.0.0
 startOf :: String -> Moment
 startOf = momentOf "begins" (== Begins)
 
--- | The action ends, however that may be, cleanup included.
+-- | The action ends, in any way, cleanup included.
 --
 -- @since 0.1.0.0
 endOf :: String -> Moment
@@ -94,19 +95,20 @@ isFaulting :: EntryKind -> Bool
 isFaulting (Faults _) = True
 isFaulting _ = False
 
--- | The action hears that it is to stop.
+-- | The action receives a stop request.
 --
 -- @since 0.1.0.0
 interruptionOf :: String -> Moment
 interruptionOf = momentOf "is interrupted" (== StopRequested)
 
--- | The condition, or what the sensor reads, becomes this; or is this from the start.
+-- | The condition, or the value that the sensor reads, becomes this, or is this from the
+-- start.
 --
 -- @since 0.1.0.0
 becoming :: Show a => String -> a -> Moment
 becoming name value = momentOf ("becomes " ++ show value) (`elem` [Is (show value), Becomes (show value)]) name
 
--- | Somebody has said this by 'Behavior.Sim.Mock.note'.
+-- | This text was recorded by 'Behavior.Sim.Mock.note'.
 --
 -- @since 0.1.0.0
 noted :: String -> Moment
@@ -124,14 +126,14 @@ isAbout :: RecordEntry -> String -> Bool
 isAbout entry name = name `elem` [subject entry, fullName entry]
 
 isEnd :: EntryKind -> Bool
-isEnd what = case what of
+isEnd kind = case kind of
   Succeeds -> True
   Fails _ -> True
   Faults _ -> True
   Stops -> True
   _ -> False
 
--- | Whichever of these.
+-- | Any of these.
 --
 -- >>> count (anyOf [startOf "drive", startOf "charge"]) record
 -- 2
@@ -145,7 +147,7 @@ anyOf ms =
     , occurrences = \rows -> foldr (merged . (`occurrences` rows)) [] ms
     }
 
--- | All rows of both, each once, in order.
+-- | The rows of both lists, each once, in order.
 merged :: Lines -> Lines -> Lines
 merged (x : xs) (y : ys) = case compare (fst x) (fst y) of
   LT -> x : merged xs (y : ys)
@@ -153,15 +155,15 @@ merged (x : xs) (y : ys) = case compare (fst x) (fst y) of
   GT -> y : merged (x : xs) ys
 merged xs ys = xs ++ ys
 
--- | Those that happen while something goes on (after its start and before its end).
+-- | Those that happen inside an interval (after its start and before its end).
 --
 -- >>> check (never (interruptionOf "drive" `during` being "low" True))
--- This does not hold: never "drive" is asked to stop while "low" is True.
+-- This does not hold: never "drive" is interrupted while "low" is True.
 -- It was so at 4.0 s:
 --     ...
 --     0.0 s  drive: begins
 --     4.0 s  low: becomes True
---   > 4.0 s  drive: is asked to stop
+--   > 4.0 s  drive: stop requested
 --     5.0 s  drive: has stopped
 --     5.0 s  charge: begins
 --     ...
@@ -170,7 +172,7 @@ merged xs ys = xs ++ ys
 during :: Moment -> Interval -> Moment
 during = restricted "while" id
 
--- | Those that happen while something does not go on.
+-- | Those that do not happen inside an interval.
 --
 -- >>> holds (never (startOf "charge" `outside` being "low" True)) record
 -- True
@@ -182,16 +184,16 @@ outside = restricted "unless" not
 restricted :: String -> (Bool -> Bool) -> Moment -> Interval -> Moment
 restricted word wanted m s =
   Moment
-    { momentWords = momentWords m ++ " " ++ word ++ " " ++ spanWords s
-    , momentNames = momentNames m ++ spanNames s
+    { momentWords = momentWords m ++ " " ++ word ++ " " ++ intervalWords s
+    , momentNames = momentNames m ++ intervalNames s
     , occurrences = \rows ->
-        let inside (n, _) = any (\(from, to) -> from < n && n < to) (stretches s rows)
+        let inside (n, _) = any (\(from, to) -> from < n && n < to) (intervalRanges s rows)
          in filter (wanted . inside) (occurrences m rows)
     }
 
--- | One begins, or both do, while the other goes on: @never (running "recharge"
--- \`overlapping\` running "drive")@ is said of two that exclude each other. Of one
--- and the same action it says that two calls of it run at once.
+-- | One interval starts while the other is going on. To claim that two actions exclude
+-- each other: @never (running "recharge" \`overlapping\` running "drive")@. With the same
+-- action twice it means that two of its calls run at the same time.
 --
 -- >>> holds (never (running "drive" `overlapping` running "charge")) record
 -- True
@@ -199,10 +201,10 @@ restricted word wanted m s =
 -- @since 0.1.0.0
 overlapping :: Interval -> Interval -> Moment
 overlapping a b =
-  (anyOf [starts a `during` b, starts b `during` a]) {momentWords = spanWords a ++ " while " ++ spanWords b}
+  (anyOf [starts a `during` b, starts b `during` a]) {momentWords = intervalWords a ++ " while " ++ intervalWords b}
  where
-  starts s = Moment (spanWords s) (spanNames s) $ \rows ->
-    let from = map fst (stretches s rows) in filter ((`elem` from) . fst) rows
+  starts s = Moment (intervalWords s) (intervalNames s) $ \rows ->
+    let from = map fst (intervalRanges s rows) in filter ((`elem` from) . fst) rows
 
 infixl 8 `during`, `outside`, `overlapping`
 
@@ -219,14 +221,16 @@ count m = length . occurrences m . numbered
 numbered :: Record -> Lines
 numbered = zip [0 ..] . entries
 
--- | What goes on for a while.
+-- | Something that has a start and an end: an action that runs, or a condition that has
+-- a certain value.
 --
 -- @since 0.1.0.0
 data Interval = Interval
-  { spanWords :: String
-  , spanNames :: [String]
-  , stretches :: Lines -> [(Int, Int)]
-  -- ^ From which entry to which.
+  { intervalWords :: String
+  , intervalNames :: [String]
+  , intervalRanges :: Lines -> [(Int, Int)]
+  -- ^ The numbers of the entry that starts it and of the one that ends it ('maxBound' if
+  -- there is none), for each time that it is going on.
   }
 
 -- | The action runs: from its beginning to its end, cleanup included.
@@ -235,23 +239,23 @@ data Interval = Interval
 running :: String -> Interval
 running name =
   Interval (show name ++ " is running") [name] $
-    stretchesFrom (\e -> e `isAbout` name && entryKind e == Begins) $ \begun e ->
+    rangesFrom (\e -> e `isAbout` name && entryKind e == Begins) $ \begun e ->
       fullName e == fullName begun && call e == call begun && isEnd (entryKind e)
 
--- | The condition, or what the sensor reads, is this.
+-- | The condition, or the value that the sensor reads, is this.
 --
 -- @since 0.1.0.0
 being :: Show a => String -> a -> Interval
 being name value =
   Interval (show name ++ " is " ++ show value) [name] $
-    stretchesFrom (\e -> e `isAbout` name && entryKind e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
+    rangesFrom (\e -> e `isAbout` name && entryKind e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
       e `isAbout` name && changes (entryKind e)
  where
   changes (Becomes _) = True
-  changes what = what == LosesValue
+  changes kind = kind == LosesValue
 
-stretchesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Lines -> [(Int, Int)]
-stretchesFrom begins ends rows =
+rangesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Lines -> [(Int, Int)]
+rangesFrom begins ends rows =
   [ (from, fromMaybe maxBound (listToMaybe [to | (to, e) <- drop (from + 1) rows, ends entry e]))
   | (from, entry) <- rows
   , begins entry

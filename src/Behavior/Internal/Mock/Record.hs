@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What has happened in a mock world, line by line.
+-- The record of a mock world.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Record
@@ -18,42 +18,41 @@ import Data.List (sortOn)
 
 import Behavior.Internal.Runtime (Seconds)
 
--- | What has happened in a mock world, in the order in which it happened. It is
--- shown as a timeline, one line an entry.
+-- | The record of a mock world: what has happened in it, in order. It is shown as a
+-- timeline, with one line for each entry.
 --
 -- @since 0.1.0.0
 data Record = Record
   { subjects :: [String]
-  -- ^ The names of all that is in the world, whether or not anything became of it.
+  -- ^ The names of everything in the world, including those without an entry.
   , entries :: [RecordEntry]
-  -- ^ What has happened, in order.
   }
   deriving (Eq)
 
 instance Show Record where
   show = unlines . timeline . entries
 
--- | One thing that has happened.
+-- | One entry of a record.
 --
 -- @since 0.1.0.0
 data RecordEntry = RecordEntry
   { entryTime :: Seconds
-  -- ^ When: in seconds since the clock of the world was started.
+  -- ^ In seconds since the clock of the world was started.
   , subject :: String
-  -- ^ The name of the action, condition or sensor; or what was noted.
+  -- ^ The name of the action, condition or sensor; or the text of the note.
   , argument :: String
-  -- ^ The argument, shown, of an action that has one; else nothing.
+  -- ^ The argument, shown, of an action that has one; otherwise empty.
   , call :: Int
-  -- ^ Which call of the action (with this argument) it belongs to, from 1.
+  -- ^ The number of the call of the action (with this argument), from 1.
   , entryKind :: EntryKind
   }
   deriving (Eq)
 
--- | Without the time: a line of a schedule, say, has that already.
+-- | Without the time, since a step of a schedule shows it already.
 instance Show RecordEntry where
-  show entry = fullName entry ++ told (entryKind entry) ++ again
+  show entry = fullName entry ++ kindText (entryKind entry) ++ again
    where
-    told what = case what of
+    kindText kind = case kind of
       Begins -> ": begins"
       Succeeds -> ": done"
       Fails why -> ": fails, " ++ why
@@ -68,7 +67,7 @@ instance Show RecordEntry where
       | call entry > 1 = " (call " ++ show (call entry) ++ ")"
       | otherwise = ""
 
--- | What can happen to the things of a mock world.
+-- | What a record entry says.
 --
 -- @since 0.1.0.0
 data EntryKind
@@ -76,31 +75,32 @@ data EntryKind
     Begins
   | -- | An action returns its result.
     Succeeds
-  | -- | An action, or its cleanup, or a reading of a sensor fails: why.
+  | -- | An action, its cleanup, or a reading of a sensor fails, with this reason.
     Fails String
-  | -- | An action, or its cleanup, or a reading of a sensor faults: why.
+  | -- | An action, its cleanup, or a reading of a sensor faults, with this reason.
     Faults String
-  | -- | An action hears that it is to stop.
+  | -- | An action receives a stop request.
     StopRequested
-  | -- | An action that was asked to stop has stopped, cleanup included.
+  | -- | An action whose stop was requested has stopped, cleanup included.
     Stops
   | -- | A condition has this value, shown, from the start.
     Is String
-  | -- | A condition, or what a sensor reads, becomes this, shown.
+  | -- | A condition, or the value that a sensor reads, becomes this, shown.
     Becomes String
   | -- | A condition has no value any more.
     LosesValue
-  | -- | Somebody said so.
+  | -- | A note, added by 'Behavior.Sim.Mock.note'.
     Noted
   deriving (Eq, Ord, Show)
 
--- | A record of what was noted, the newest first. A thread notes its time and then
--- the entry, so that entries of several threads can be noted in another order than
--- that of their times. Entries of one moment stay in the order of the noting.
+-- | The record with these names and these entries, given newest first. A thread first
+-- reads the time and then adds its entry, so the entries of several threads may be added
+-- in a different order than that of their times. Entries with equal times stay in the
+-- order in which they were added.
 recorded :: [String] -> [RecordEntry] -> Record
 recorded names = Record names . sortOn entryTime . reverse
 
--- | The name of whom an entry is about, with the argument if there is one.
+-- | The subject of an entry, with the argument if there is one.
 fullName :: RecordEntry -> String
 fullName entry
   | null (argument entry) = subject entry
@@ -113,7 +113,7 @@ timeline lines' = [padded (inSeconds (entryTime entry)) ++ "  " ++ show entry | 
   padded time = replicate (width - length time) ' ' ++ time
   width = maximum (0 : map (length . inSeconds . entryTime) lines')
 
--- | A time to read: sums of seconds are off by less than anybody wants to see.
+-- | A time rounded to microseconds, which hides the rounding errors of sums.
 inSeconds :: Seconds -> String
 inSeconds s
   | abs s < 1e9 = show (fromInteger (round (s * 1000000)) / 1000000 :: Seconds) ++ " s"

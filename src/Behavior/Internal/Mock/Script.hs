@@ -2,7 +2,7 @@
 {-# LANGUAGE DeriveFunctor #-}
 
 -- |
--- What a scripted action does when it is called once.
+-- Scripts: what a scripted action does in one call.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Script
@@ -21,7 +21,7 @@ module Behavior.Internal.Mock.Script
   , taking
   , causing
 
-    -- * What it does when it is asked to stop
+    -- * What it does when its stop is requested
   , slowToStop
   , failsStopping
   , faultsStopping
@@ -43,7 +43,7 @@ import Behavior.Internal.Seconds (Seconds, duration)
 -- >>> mock <- newMock
 
 -- | What a scripted action does in one call: how it ends, how long it takes, what
--- it causes, and what it does when it is asked to stop.
+-- it causes, and what it does when its stop is requested.
 --
 -- > fails "locked" `taking` 0.5
 -- > succeeds `taking` 20 `causing` set batteryLow False `slowToStop` 2
@@ -57,12 +57,12 @@ data Script a = Script
   }
   deriving (Functor)
 
--- | What a scripted action does when it is asked to stop.
+-- | What a scripted action does when its stop is requested.
 data Stopping
-  = -- | It cleans up for so long, uninterruptibly, then lets itself be stopped, or
-    -- throws this instead.
+  = -- | It cleans up for the given time, uninterruptibly. Then it stops, or throws the
+    -- given exception instead.
     CleansUp Seconds (Maybe SomeException)
-  | -- | It does not heed.
+  | -- | It ignores the request.
     GoesOn
 
 -- | Succeeds at once.
@@ -73,7 +73,7 @@ data Stopping
 succeeds :: Script ()
 succeeds = returning ()
 
--- | Returns this at once.
+-- | Returns the given result at once.
 --
 -- >>> look <- action mock "look" [returning "a cat", returning "a dog"]
 -- >>> look >> look
@@ -105,8 +105,8 @@ fails = throws . FailedBecause
 faults :: String -> Script a
 faults = throws . ErrorCall
 
--- | Throws an exception of your own at once. It is on record as a failure if it is
--- one (a 'Behavior.BehaviorFailed'), else as a fault.
+-- | Throws the given exception at once. It is recorded as a failure if it is one (a
+-- 'Behavior.BehaviorFailed'), otherwise as a fault.
 --
 -- >>> grasp <- action mock "grasp" [throws (userError "no hand") :: Script ()]
 -- >>> grasp
@@ -116,32 +116,33 @@ faults = throws . ErrorCall
 throws :: Exception e => e -> Script a
 throws = ending . Left . toException
 
--- | Goes on for ever, until it is asked to stop.
+-- | Runs until its stop is requested.
 --
 -- @since 0.1.0.0
 hangs :: Script a
-hangs = faults "the end of all time has come" `taking` (1 / 0)
+hangs = faults "unreachable: an infinite time has passed" `taking` (1 / 0)
 
--- | Takes so many seconds (zero or more; infinite is for ever) before it ends.
+-- | Takes the given number of seconds (zero or more; possibly infinite) before it ends.
 --
 -- > script `taking` 0             =  script
 -- > script `taking` s `taking` t  =  script `taking` (s + t)
 --
--- The time passes by 'Behavior.sleep': under simulation in no time at all.
+-- It waits by 'Behavior.sleep': in a simulation that takes no real time.
 --
 -- >>> wait <- action mock "wait" [succeeds `taking` 0.001]
 -- >>> wait
 --
--- A negative number is refused by what the script is given to, as is NaN.
+-- A negative number or NaN is rejected by the function that the script is given to.
 --
 -- @since 0.1.0.0
 taking :: Script a -> Seconds -> Script a
 taking script seconds = script {lasts = lasts script + seconds}
 
--- | Does this to the world when its time is over, right before it ends.
+-- | Runs the given effect when the time of the action is over, right before it ends.
 --
--- It runs with exceptions masked; what it throws, the action throws. Mostly it 'Behavior.Sim.Mock.set's
--- a condition. An action that is stopped before its time is over causes nothing.
+-- The effect runs with exceptions masked; what it throws, the action throws. Usually it
+-- 'Behavior.Sim.Mock.set's a condition. An action that is stopped before its time is
+-- over causes nothing.
 --
 -- >>> low <- condition mock "battery low" [(0, True)]
 -- >>> recharge <- action mock "recharge" [succeeds `causing` set low False]
@@ -152,8 +153,8 @@ taking script seconds = script {lasts = lasts script + seconds}
 causing :: Script a -> Behavior () -> Script a
 causing script more = script {effect = effect script >> more}
 
--- | When it is asked to stop, it cleans up for so many seconds (zero or more), and
--- cannot be interrupted there. Said twice, it adds up.
+-- | When its stop is requested, it cleans up for the given number of seconds (zero or
+-- more), uninterruptibly. Applied twice, the times add up.
 --
 -- @since 0.1.0.0
 slowToStop :: Script a -> Seconds -> Script a
@@ -161,14 +162,14 @@ slowToStop script seconds = case stopping script of
   CleansUp s instead -> script {stopping = CleansUp (s + seconds) instead}
   GoesOn -> script
 
--- | When it is asked to stop, its cleanup fails for this reason, which takes the place
--- of the cancellation.
+-- | When its stop is requested, its cleanup fails for the given reason; this failure
+-- replaces the cancellation.
 --
 -- @since 0.1.0.0
 failsStopping :: Script a -> String -> Script a
 failsStopping script = throwsStopping script . FailedBecause
 
--- | When it is asked to stop, its cleanup faults, which takes the place of the
+-- | When its stop is requested, its cleanup faults; this fault replaces the
 -- cancellation.
 --
 -- @since 0.1.0.0
@@ -180,16 +181,16 @@ throwsStopping script e = case stopping script of
   CleansUp s _ -> script {stopping = CleansUp s (Just (toException e))}
   GoesOn -> script
 
--- | When it is asked to stop, it goes on as if it had not been, and cannot be
--- interrupted any more: it ends as it would have ended, and as late. (So nothing stops
--- one that 'hangs'.)
+-- | When its stop is requested, it ignores that and continues uninterruptibly: it ends
+-- in the same way and at the same time as without the request. (So nothing stops one
+-- that 'hangs'.)
 --
 -- @since 0.1.0.0
 completesAnyway :: Script a -> Script a
 completesAnyway script = script {stopping = GoesOn}
 
--- | Refuses a script that takes no length of time.
+-- | Rejects a script whose times are negative or NaN.
 checkScript :: String -> Script a -> IO ()
-checkScript who script = do
-  _ <- duration who (lasts script)
-  for_ [s | CleansUp s _ <- [stopping script]] (duration who)
+checkScript owner script = do
+  _ <- duration owner (lasts script)
+  for_ [s | CleansUp s _ <- [stopping script]] (duration owner)

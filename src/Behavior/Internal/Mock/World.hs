@@ -3,9 +3,9 @@
 -- |
 -- A mock world, and the record of what happens there.
 --
--- To note something is no operation of the seam, but to ask for the time is. So what
--- is noted right after the time was asked for, and what is done right after that, is
--- one step of a simulation.
+-- To record an entry is not an operation of the seam, but to read the time is. So the
+-- entry that is recorded right after reading the time, and what is done right after
+-- that, belong to the same step of a simulation.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.World
@@ -42,20 +42,19 @@ import Behavior.Internal.Runtime
 -- >>> import Behavior.Sim.Mock
 -- >>> mock <- newMock
 
--- | A world in which nothing is real, and the record of what happens there. One world
--- is for one run.
+-- | A mock world, and the record of what happens there. Make a new one for each run.
 --
 -- @since 0.1.0.0
 data Mock = Mock
   { origin :: IORef (Maybe Seconds)
   -- ^ When the world's clock was started.
   , elapsed :: IORef (IO Seconds)
-  -- ^ How long it has gone in a simulation, until that ended; in reality this is zero.
+  -- ^ How long the clock has run in a simulation, up to its end; in reality this is zero.
   , names :: IORef [String]
   , newestEntries :: IORef [RecordEntry]
   -- ^ Newest first.
-  , unseen :: IORef [Seconds -> STM [RecordEntry]]
-  -- ^ The changes until then that were due, but that nobody has seen yet.
+  , pendingChanges :: IORef [Seconds -> STM [RecordEntry]]
+  -- ^ For each condition its changes that are due by a given time but not recorded yet.
   }
 
 -- | An empty world.
@@ -64,8 +63,8 @@ data Mock = Mock
 newMock :: IO Mock
 newMock = Mock <$> newIORef Nothing <*> newIORef (pure 0) <*> newIORef [] <*> newIORef [] <*> newIORef []
 
--- | Starts the clock of the world, if it does not go already. Otherwise it starts
--- when the first action begins, or a condition is looked at for the first time.
+-- | Starts the clock of the world, if it is not running yet. Without this it starts
+-- when the first action begins, or when a condition is read for the first time.
 --
 -- >>> begin mock
 --
@@ -73,8 +72,9 @@ newMock = Mock <$> newIORef Nothing <*> newIORef (pure 0) <*> newIORef [] <*> ne
 begin :: Mock -> Behavior ()
 begin = void . clock
 
--- | When the world's clock was started, and what time it is. A scheduling point, and
--- the only operation of the seam in here that is done just to note something.
+-- | The time at which the world's clock was started, and the current time. This is a
+-- scheduling point, and the only operation of the seam that the mock world adds in order
+-- to record something.
 clock :: Mock -> IO (Seconds, Seconds)
 clock mock = do
   t <- now
@@ -83,8 +83,8 @@ clock mock = do
   when isFirst $ runClock >>= mapM_ (writeIORef (elapsed mock) . fmap (subtract zero))
   pure (zero, t)
 
--- | Notes, which nothing can block or interrupt where exceptions are masked. When the run
--- has ended, the record has.
+-- | Adds an entry to the record. Where exceptions are masked, this neither blocks nor is
+-- interrupted. After the end of the run nothing is recorded.
 recordEntry :: Mock -> RecordEntry -> IO ()
 recordEntry mock entry = do
   goesOn <- isRecorded
@@ -92,7 +92,7 @@ recordEntry mock entry = do
     atomicModifyIORef' (newestEntries mock) (\old -> (entry : old, ()))
     annotate (show entry)
 
--- | Puts a note of your own on record.
+-- | Adds a note, any text of your own, to the record.
 --
 -- >>> note mock "a sheep crosses the road"
 -- >>> mock `shouldRecord` eventually (noted "a sheep crosses the road")
@@ -103,7 +103,7 @@ note mock text = do
   (zero, t) <- clock mock
   mask_ $ recordEntry mock (RecordEntry (t - zero) text "" 1 Noted)
 
--- | Gives a thing of the world its name, which must not be another one's.
+-- | Registers the name of something in the world. Each name can be used only once.
 registerName :: Mock -> String -> String -> IO ()
 registerName mock kind name = do
   taken <- atomicModifyIORef' (names mock) $ \old ->
@@ -111,32 +111,33 @@ registerName mock kind name = do
   when taken . throwIO . ErrorCall $
     kind ++ " " ++ show name ++ ": something else in this world has this name already"
 
--- | Has changes put on record (of those that were due by a given time) that nobody
--- has seen.
+-- | Registers how to find the changes of a condition that are due by a given time but not
+-- recorded yet.
 registerPending :: Mock -> (Seconds -> STM [RecordEntry]) -> IO ()
-registerPending mock due = atomicModifyIORef' (unseen mock) (\old -> (due : old, ()))
+registerPending mock due = atomicModifyIORef' (pendingChanges mock) (\old -> (due : old, ()))
 
--- | All that has happened until now. A change of a condition is on record once
--- something later is, or a simulated run has come to its time, whether or not anybody has
--- seen it. The record ends when the run does: what is unwound after that is not on it.
+-- | All that has happened until now. A change of a condition is in the record once a
+-- later entry is, or once a simulated run has reached its time, even if nothing has read
+-- the condition. The record ends when the run ends: what is unwound after that is not in
+-- it.
 --
 -- >>> wave <- action mock "wave" [succeeds]
 -- >>> wave
--- >>> map happening . entries <$> happened mock
+-- >>> map entryKind . entries <$> happened mock
 -- [Begins,Succeeds]
 --
 -- @since 0.1.0.0
 happened :: Mock -> IO Record
 happened mock = do
   seen <- readIORef (newestEntries mock)
-  conditions <- readIORef (unseen mock)
+  conditions <- readIORef (pendingChanges mock)
   came <- join (readIORef (elapsed mock))
   due <- atomically (traverse ($ maximum (came : map entryTime seen)) conditions)
   known <- readIORef (names mock)
   pure (recorded (reverse known) (reverse (join due) ++ seen))
 
--- | Throws a 'BrokenClaim', which says why, unless the claim holds of what has
--- happened. To be used as hspec's expectations are.
+-- | Throws a 'BrokenClaim' with the reason, unless the claim holds for the record. Use it
+-- like an expectation of hspec.
 --
 -- >>> mock `shouldRecord` eventually (noted "all is well")
 -- *** Exception: This does not hold: eventually "all is well" is noted.
@@ -149,7 +150,7 @@ shouldRecord mock claim = happened mock >>= either (throwIO . BrokenClaim) pure 
 
 infix 1 `shouldRecord`
 
--- | A claim that does not hold, and why; it is shown to be read.
+-- | The text of a claim that does not hold, with the reason.
 --
 -- @since 0.1.0.0
 newtype BrokenClaim = BrokenClaim String
