@@ -34,9 +34,8 @@ import Data.Foldable (traverse_)
 import Data.IORef
 import Data.Traversable (for)
 
-import Behavior.Internal.Failure (isCancellation, isFailure)
+import Behavior.Internal.Failure (StoppedWithFault (..), isCancellation, isFailure)
 import Behavior.Internal.Runtime
-import Behavior.Internal.Failure (StoppedWithFault (..))
 
 -- | What can be wrong with an operator.
 data Flaw
