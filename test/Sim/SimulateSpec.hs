@@ -67,13 +67,13 @@ times = do
   it "and none if no branch sleeps" $
     finished <$> simulate (both (pure ()) (atomically (pure ()))) `shouldReturn` 0
   it "and sleepers that are due at the same time wake in any order" $ do
-    book <- newIORef ([] :: [String])
+    logged <- newIORef ([] :: [String])
     forM_ [1 .. 40] $ \seed -> do
       order <- newTVarIO []
       let arm name = sleep 1 >> atomically (modifyTVar' order (name :))
       _ <- simulateWith defaults {scheduled = Seeded seed} (both (arm 'l') (arm 'r'))
-      readTVarIO order >>= \o -> modifyIORef book (o :)
-    orders <- readIORef book
+      readTVarIO order >>= \o -> modifyIORef logged (o :)
+    orders <- readIORef logged
     nub orders `shouldMatchList` ["lr", "rl"]
   it "up to endAt" $ do
     run <- simulateWith defaults {endAt = 10} (forever (sleep 3) :: Behavior ())
@@ -123,27 +123,27 @@ delivery = do
   it "masked uninterruptibly: never" $
     reached uninterruptibleMask_ (sleep 1) `shouldReturn` ["went on"]
   it "after the last operation: that keeps its effect" $ do
-    book <- newIORef []
-    _ <- simulate (parallel (modifyIORef book ("went on" :)) (failed :: Behavior ())) 
-    readIORef book `shouldReturn` ["went on"]
+    logged <- newIORef []
+    _ <- simulate (parallel (modifyIORef logged ("went on" :)) (failed :: Behavior ())) 
+    readIORef logged `shouldReturn` ["went on"]
   it "to a thread that has not begun: before its first step" $ do
-    book <- newIORef []
+    logged <- newIORef []
     -- The second branch runs after the first has failed.
     void . simulateWith defaults {scheduled = Preempting [(4, 1), (5, 1), (6, 0)]} $
-      parallel (failed :: Behavior ()) (modifyIORef book ("began" :))
-    began <- readIORef book
+      parallel (failed :: Behavior ()) (modifyIORef logged ("began" :))
+    began <- readIORef logged
     began `shouldSatisfy` (`elem` [[], ["began"]])
  where
   -- The stop is requested at the time 0 at which the operation begins.
   reached masked operation = do
-    book <- newIORef []
-    asked <- newTVarIO False
+    logged <- newIORef []
+    requested <- newTVarIO False
     void . simulate $
       parallel
-        (masked (uninterruptibleMask_ (atomically (readTVar asked >>= STM.check)) >> operation >> modifyIORef book ("went on" :)))
-        (atomically (writeTVar asked True) >> (failed :: Behavior ()))
+        (masked (uninterruptibleMask_ (atomically (readTVar requested >>= STM.check)) >> operation >> modifyIORef logged ("went on" :)))
+        (atomically (writeTVar requested True) >> (failed :: Behavior ()))
         ? pure ()
-    readIORef book
+    readIORef logged
 
 mistakes :: Spec
 mistakes = do
@@ -211,30 +211,30 @@ mistakes = do
 unwinding :: Spec
 unwinding = do
   it "by a deadlock, every cleanup has run, one at a time" $ do
-    book <- newIORef []
+    logged <- newIORef []
     inside <- newIORef (0 :: Int)
     let cleaned name = do
           modifyIORef inside (+ 1)
           forM_ [1 .. 100 :: Int] (const yield)
           n <- readIORef inside
-          unless (n == 1) (modifyIORef book ("not alone" :))
+          unless (n == 1) (modifyIORef logged ("not alone" :))
           modifyIORef inside (subtract 1)
-          modifyIORef book (name :)
+          modifyIORef logged (name :)
         hanging name = (atomically retry :: Behavior ()) `finally` cleaned name
     _ <- simulate (both (hanging "left") (hanging "right") `finally` cleaned "main")
-    reverse <$> readIORef book `shouldReturn` ["right", "left", "main"]
+    reverse <$> readIORef logged `shouldReturn` ["right", "left", "main"]
   it "a cleanup's transactions and sleeps have run" $ do
     motor <- newTVarIO True
     _ <- simulate ((atomically retry :: Behavior ()) `finally` (sleep 1 >> atomically (writeTVar motor False)))
     readTVarIO motor `shouldReturn` False
   it "a cleanup that blocks, or starts branches, is unwound, too" $ do
-    book <- newIORef []
+    logged <- newIORef []
     _ <-
       simulate $
         (atomically retry :: Behavior ())
-          `finally` (both (atomically retry :: Behavior ()) (atomically retry :: Behavior ()) `finally` modifyIORef book ("inner" :))
-          `finally` modifyIORef book ("outer" :)
-    reverse <$> readIORef book `shouldReturn` ["inner", "outer"]
+          `finally` (both (atomically retry :: Behavior ()) (atomically retry :: Behavior ()) `finally` modifyIORef logged ("inner" :))
+          `finally` modifyIORef logged ("outer" :)
+    reverse <$> readIORef logged `shouldReturn` ["inner", "outer"]
   it "a behaviour that catches every exception does not continue" $ do
     count <- newIORef (0 :: Int)
     let stubborn = forever $ do
@@ -246,17 +246,17 @@ unwinding = do
     threadDelay 1000
     readIORef count `shouldReturn` counted
   it "at endAt, every cleanup has run" $ do
-    book <- newIORef []
-    _ <- simulateWith defaults {endAt = 1} (parallel (sleep 5 `finally` modifyIORef book ("left" :)) (sleep 9 `finally` modifyIORef book ("right" :)))
-    reverse <$> readIORef book `shouldReturn` ["right", "left"]
+    logged <- newIORef []
+    _ <- simulateWith defaults {endAt = 1} (parallel (sleep 5 `finally` modifyIORef logged ("left" :)) (sleep 9 `finally` modifyIORef logged ("right" :)))
+    reverse <$> readIORef logged `shouldReturn` ["right", "left"]
   it "by a cancellation of the simulation's caller, every cleanup has run" $ do
-    book <- newIORef []
+    logged <- newIORef []
     begun <- newEmptyMVar
-    let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef book ("cleaned up" :)
+    let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef logged ("cleaned up" :)
     withAsync (simulateWith defaults {livelockLimit = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
       takeMVar begun
       cancel caller
-    readIORef book `shouldReturn` ["cleaned up"]
+    readIORef logged `shouldReturn` ["cleaned up"]
   it "no fork has outlived its scope" $ do
     run <- simulate (scoped (\nursery -> void (fork nursery (sleep 100)) >> sleep 1))
     (finished run, leakedThreads run) `shouldBe` (1, [])
@@ -286,6 +286,6 @@ beside = do
       ended run `shouldBe` "failed Failed"
       (end - begin) `shouldSatisfy` (>= 0.002)
   it "a note of another run is not in the steps" $ do
-    annotate "of nobody"
-    run <- simulate (annotate "of mine")
-    [text | Note text <- map did (steps run)] `shouldBe` ["of mine"]
+    annotate "outside"
+    run <- simulate (annotate "inside")
+    [text | Note text <- map did (steps run)] `shouldBe` ["inside"]
