@@ -232,10 +232,10 @@ compared world = case paths 500 whatIsDone world of
 relation :: Spec
 relation = do
   describe "Sequences and fallbacks" $ do
-    it "runs the second when the first fails, and not when it faults" $ do
+    it "run the second program when the first fails, and not when it faults" $ do
       (act "a" 1 Fails `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
       (act "a" 1 Faults `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 1 (Faulted "a")]
-    it "throws the last failure of several attempts" $ do
+    it "throw the last failure of several attempts" $ do
       Attempt 2 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 3 (Failed "a")]
       Attempt 3 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 6 (Succeeded (Number 7))]
       Attempt 0 (act "a" 1 (Succeeds 7)) `endsIn` [Gave 0 (Failed noAlternative)]
@@ -268,8 +268,8 @@ relation = do
       Scoped (Fork (Do "a" [(script 2 (Succeeds 0)) {masking = Uninterruptible}] `Then` Fork (act "b" 1 Faults)) `Then` act "c" 1 (Succeeds 7))
         `endsIn` [Gave 2 (Succeeded (Number 7))]
 
-  describe "A stop request" $ do
-    it "keeps the result of a branch that completes despite it" $
+  describe "Stopping" $ do
+    it "keeps the result of a branch that completes despite its stop request" $
       Timeout 1 (stoppedBy (EndsAfter 2 (Succeeds 7)) "a") `endsIn` [Gave 3 (Succeeded (Number 7))]
     it "throws the fault of a cleanup" $
       Timeout 1 (stoppedBy (EndsAfter 2 Faults) "a") `endsIn` [Gave 3 (Faulted (cleanupOf "a"))]
@@ -283,12 +283,12 @@ relation = do
     it "throws the fault of a cleanup together with another thread's cancellation" $ do
       (with [] (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))) {cancelAt = 2, caller = PlainThread Asynchronous 1}
         `endsWith` [Gave 5 (Stopped (Just (cleanupOf "b")))]
-    it "can be repeated by another thread, and is then received after a cleanup" $ do
+    it "can be requested twice by another thread; the second request is received after a cleanup" $ do
       (with [] (stoppedBy (EndsAfter 0 (Succeeds 7)) "a" `Then` stoppedBy StopsAtOnce "b")) {cancelAt = 2, caller = PlainThread Asynchronous 1}
         `endsWith` [Gave 3 (Stopped Nothing)]
       (with [] (stoppedBy (EndsAfter 2 (Succeeds 7)) "a")) {cancelAt = 2, caller = PlainThread Asynchronous 1}
         `endsWith` [Gave 4 (Stopped Nothing)]
-    it "by another thread, when repeated, interrupts the caller's cleanup, but not a branch's" $ do
+    it "that another thread requests twice interrupts the caller's cleanup, but not a branch's" $ do
       (with [] (stoppedBy (CleansUpInterruptibly 5) "a")) {cancelAt = 2, caller = PlainThread Asynchronous 1} `endsWith` [Gave 3 (Stopped Nothing)]
       (with [] (Timeout 50 (stoppedBy (CleansUpInterruptibly 5) "a"))) {cancelAt = 2, caller = PlainThread Asynchronous 1}
         `endsWith` [Gave 7 (Stopped Nothing)]
@@ -324,7 +324,7 @@ relation = do
     it "skip the slots that a slow reading has missed" $
       WaitUntil (Polled 2 (Do "s" [script 0 (Succeeds 0), script 3 (Succeeds 0), script 0 (Succeeds 1)]))
         `endsIn` [Gave 6 (Succeeded Unit)]
-    it "are decided by a reading that began after the branch had stopped" $
+    it "are read again by a reading that began after the branch had stopped" $
       RSelect
         (Polled 2 (Do "s" [script 0 (Succeeds 1), script 1 (Succeeds 0), script 1 (Succeeds 1)]))
         (Do "l" [(script 9 (Succeeds 1)) {onStop = StopsAfter 2}, script 1 (Succeeds 2)])

@@ -224,4 +224,4 @@ leftWins stage l (Relay composition n runners) = do
   failureOf k = "Failure " ++ show (show k)
   -- In a simulation, waiting for the end of a thread throws an exception to it ('untilOver').
   -- A branch that succeeds can still receive that before its end.
-  overtaken = [CancelledBy (show (Cancel "nobody")) | any ((== Succeeds) . snd) runners]
+  overtaken = [CancelledBy (show (Cancel "untilOver")) | any ((== Succeeds) . snd) runners]

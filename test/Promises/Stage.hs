@@ -172,8 +172,8 @@ data StopResponse = Stops | Completes | FailsToStop | FaultsInCleanup
   deriving (Bounded, Enum, Eq, Show)
 
 -- | Runs the action. If it completes despite a stop request, it returns the negated number.
--- The first argument runs when the action has begun, unmasked; the second when its cleanup
--- is interrupted, which a second stop request would do.
+-- The first argument runs at the start of the action, and can be interrupted; the second runs
+-- when the cleanup is interrupted, which only a second stop request does.
 perform :: Stage -> Behavior () -> Behavior () -> Act -> Behavior Int
 perform stage begun cleanupInterrupted act = work `catch` stopping
  where

@@ -96,7 +96,7 @@ simulated simulating =
           none -> broken (explain none)
     , tick = 1
     , -- The exception is pending until the thread ends (or is raised there if it unmasks before).
-      untilOver = \thread -> interrupt thread (Cancel "nobody")
+      untilOver = \thread -> interrupt thread (Cancel "untilOver")
     }
 
 -- | Tests the given number of random programs in reality, from the one with this number on.

@@ -257,7 +257,7 @@ receive t = \case
 -- * Branches
 
 threadSteps :: Now -> Thread -> Steps Thread
-threadSteps t (Thread label life) = case life of
+threadSteps t (Thread label state) = case state of
   -- The work is done, and a stop request can still arrive.
   Live requests (Returning result) -> returning Finished requests result
   Live requests (AsChild k (Returning result)) -> returning (FinishedChild k) requests result
@@ -319,10 +319,10 @@ reactions t p source v phase = case phase of
     Conclude result -> conclude React result source' []
    where
     value = valueOf p seen
-  -- The sensors keep running if the signal is read again after this reaction's stop.
-  stopping next source' branch = Reacting p (alike source') v (Stopping next (requestStop branch))
+  -- The sensors keep running if the signal is read again after the branch has stopped.
+  stopping next source' branch = Reacting p (keepOrStop source') v (Stopping next (requestStop branch))
    where
-    alike = case next of
+    keepOrStop = case next of
       Run _ -> id
       Idle -> id
       _ -> requestStopOfSource
