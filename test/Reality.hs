@@ -1,6 +1,6 @@
 -- |
--- Compares the simulator with reality at length. It takes the arguments of hspec, and first
--- the seed of the random programs.
+-- A long comparison of the simulator with reality. The first argument is the seed of the
+-- random programs, the others are those of hspec.
 --
 -- > reality 7
 module Main (main) where
@@ -16,4 +16,4 @@ main = do
   arguments <- getArgs
   case arguments of
     n : others | [(number, "")] <- reads n -> withArgs others . hspec $ specWith (Effort 1000 2000 number 200 20000 10000 60)
-    _ -> die "reality: the first argument is the seed of the random programs, 7 say"
+    _ -> die "reality: the first argument is the seed of the random programs, for example 7"

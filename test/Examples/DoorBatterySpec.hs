@@ -26,40 +26,40 @@ spec = do
 -- | Each mission takes milliseconds, in which minutes pass.
 simulation :: Spec
 simulation = do
-  it "tells the story with the times of the world" $ do
-    (story, m) <- simulated (given []) NonPreemptive
+  it "prints its timeline with the times of the world" $ do
+    (timeline, m) <- simulated (given []) NonPreemptive
     end <$> m `shouldBe` Just TaskDone
-    take 5 story
+    take 5 timeline
       `shouldBe` [ "    0.0 s   13 %  open front door ..."
                  , "    0.5 s   11 %  open front door: failed, the front door is locked"
                  , "    0.5 s   11 %  open back door ..."
                  , "    0.8 s    9 %  open back door: interrupted, motors off"
                  , "    0.8 s    9 %  recharge ..."
                  ]
-    last story `shouldSatisfy` isSuffixOf "the task is done"
+    last timeline `shouldSatisfy` isSuffixOf "the task is done"
 
   for_ endings $ \(arguments, expected, exit, line) ->
-    it ("ends as the real one: " ++ unwords arguments) $ do
-      (story, m) <- simulated (given arguments) NonPreemptive
+    it ("ends like a real one: " ++ unwords arguments) $ do
+      (timeline, m) <- simulated (given arguments) NonPreemptive
       let how = maybe NotOver end m
       (how, status how) `shouldBe` (expected, exit)
-      last story `shouldSatisfy` isSuffixOf line
+      last timeline `shouldSatisfy` isSuffixOf line
 
-  it "knows how far the battery came down" $ do
-    -- Read every 10 ms, at 4 % a second, it is low just below 10 %.
+  it "reports the lowest level of the battery" $ do
+    -- Read every 10 ms, at 4 % per second, the battery is low just below 10 %.
     (_, m) <- simulated (given []) NonPreemptive
     lowest <$> m `shouldSatisfy` maybe False (\level -> level > 9.8 && level < 10)
     (_, n) <- simulated (given ["--drain", "0"]) NonPreemptive
     lowest <$> n `shouldBe` Just 13
 
-  it "that would go on for ever is given up" $ do
-    -- Full for hardly a second, with a task that takes several.
-    (story, m) <- simulated (given ["--threshold", "95", "--speed", "0.1"]) NonPreemptive
+  it "without an end is given up" $ do
+    -- The battery is above the threshold for less than a second, and the task takes several.
+    (timeline, m) <- simulated (given ["--threshold", "95", "--speed", "0.1"]) NonPreemptive
     m `shouldBe` Nothing
     status NotOver `shouldBe` ExitFailure 4
-    last story `shouldContain` "given up"
+    last timeline `shouldContain` "given up"
 
-  it "is the same again by the same seed and schedule, and another by another" $ do
+  it "is the same for the same seed and schedule, and different for another seed" $ do
     let run k n = simulated (given ["--seed", show (k :: Int)]) (Seeded n)
     first <- run 1 2
     run 1 2 `shouldReturn` first
@@ -67,16 +67,16 @@ simulation = do
 
 exploration :: Spec
 exploration = do
-  it "are as many as were asked for, all different" $ do
+  it "have the given number, and are different" $ do
     missions <- explored 20 (given [])
     map fst missions `shouldBe` [1 .. 20]
     worst missions `shouldBe` TaskDone
     length (nub (map (fmap lasted . snd) missions)) `shouldSatisfy` (> 10)
 
-  it "start from the seed that is given" $
+  it "start from the given seed" $
     map fst <$> explored 3 (given ["--seed", "41"]) `shouldReturn` [41, 42, 43]
 
-  it "are reported with how to see the worst again, and that shows it" $ do
+  it "are reported with the options that run the worst one again" $ do
     missions <- explored 50 (given tight)
     let report = reported missions
         level = minimum (mapMaybe (fmap lowest . snd) missions)
@@ -84,18 +84,18 @@ exploration = do
     again "lowest battery: " report >>= (`shouldBe` Just level) . fmap lowest
     again "longest mission: " report >>= (`shouldBe` Just longest) . fmap lasted
 
-  it "end as the worst of them" $ do
+  it "end with the status of the worst" $ do
     missions <- explored 3 (given ["--front", "sealed", "--back", "sealed"])
     status (worst missions) `shouldBe` ExitFailure 1
     reported missions `shouldContain` ["      3  the robot failed: --simulate --seed 1 --schedule 1"]
 
-  it "are reported when some come to no end" $ do
+  it "are reported when some do not end" $ do
     report <- reported <$> explored 1 (given ["--threshold", "95", "--action", "60", "--charge", "1"])
     report !! 5 `shouldContain` "      1  not over"
  where
-  -- Sometimes low on the way, sometimes not.
+  -- The battery gets low in some of the missions.
   tight = ["--battery", "31", "--action", "0.9"]
-  -- The mission that the line of the report says how to see.
+  -- The mission with the options in the report's line.
   again title report = case mapMaybe (stripPrefix title) report of
     [text] -> case parse (tight ++ words (drop 2 (dropWhile (/= ':') text))) of
       Success o | Simulated (Just n) <- mode o -> snd <$> simulated o (Seeded (fromInteger n))
@@ -116,31 +116,31 @@ endings =
 
 commandLine :: Spec
 commandLine = do
-  it "takes every state of a door" $
+  it "accepts every state of a door" $
     for_ states $ \(word, state) ->
       accepted ["--front", word, "--back", word] (\o -> (front o, back o)) `shouldBe` Just (state, state)
 
-  it "takes every version of the paper's program" $
+  it "accepts every version of the paper's program" $
     for_ (zip ["1", "2", "3", "4", "intro"] [minBound ..]) $ \(word, chosen) ->
       accepted ["--program", word] program `shouldBe` Just chosen
 
-  describe "refuses, with exit status 2 and what is allowed," $
+  describe "rejects, with exit status 2 and the allowed values," $
     for_ refusals $ \(option, word, allowed) ->
       it (option ++ " " ++ word) $ do
         let (message, exit) = refused (words option ++ [word])
         exit `shouldBe` ExitFailure 2
         message `shouldContain` allowed
 
-  it "refuses a threshold for the programs that are printed with one" $
+  it "rejects a threshold for the programs that have a fixed one" $
     snd (refused ["--program", "3", "--threshold", "20"]) `shouldBe` ExitFailure 2
 
-  it "has the exit status 0 when it was asked for help" $
+  it "has the exit status 0 with --help" $
     snd (refused ["--help"]) `shouldBe` ExitSuccess
 
-  it "says how missions are run" $
+  it "selects how missions are run" $
     for_ modes $ \(arguments, chosen) -> accepted arguments mode `shouldBe` Just chosen
 
-  it "refuses two ways at once, and a schedule where there is none" $
+  it "rejects two modes at once, and a schedule in the wrong mode" $
     for_ [["--simulate", "--explore", "2"], ["--schedule", "1"], ["--explore", "2", "--schedule", "1"]] $
       (`shouldBe` ExitFailure 2) . snd . refused
  where
@@ -186,7 +186,7 @@ accepted arguments field = case parse arguments of
   Success o -> Just (field o)
   _ -> Nothing
 
--- | What is said, and the exit status.
+-- | The message, and the exit status.
 refused :: [String] -> (String, ExitCode)
 refused arguments = case parse arguments of
   Failure failure -> renderFailure failure "door-battery"

@@ -1,6 +1,6 @@
 -- |
--- The greenhouse rover in its mock greenhouses: its missions in virtual time, its safety
--- rules under many schedules, and once on real threads.
+-- The greenhouse rover in mock greenhouses: its missions in virtual time, and its safety
+-- rules under many schedules and on real threads.
 module Examples.GreenhouseRoverSpec (spec) where
 
 import Control.Exception (fromException, throwIO, try)
@@ -26,7 +26,7 @@ spec :: Spec
 spec = guarded $ do
   describe "A mission" missions
   describe "Under many schedules" manySchedules
-  it "keeps its rules on real threads too" $ do
+  it "keeps its rules on real threads, too" $ do
     (world, hardware) <- greenhouses calm {emergency = pressedAt 1}
     _ <- condition world later (pressedAt 1.1)
     beds <- newBeds [Bed North 1]
@@ -39,7 +39,7 @@ missions = do
     (found, world) <- inspecting [Bed North 1, Bed South 1] calm
     found `shouldBe` Map.fromList (seen <$> [Bed North 1, Bed South 1])
     world `shouldRecord` whenever (successOf "camera Bed South 1") (eventually (becoming "position" (AtDock North)))
-  it "inspects a bed that the operator adds meanwhile, and refuses one that it knows" $ do
+  it "inspects a bed that the operator adds meanwhile, and rejects one that it has already" $ do
     (world, hardware) <- greenhouses calm
     beds <- newBeds [Bed North 1]
     run <- simulate . scoped $ \nursery -> do
@@ -48,41 +48,41 @@ missions = do
     found <- returned run
     found `shouldBe` Map.fromList (seen <$> [Bed North 1, Bed South 1])
     world `shouldRecord` exactly 1 (startOf "camera Bed North 1")
-  it "takes its list up where it was left off, after charging" $ do
+  it "continues its list after charging" $ do
     (found, world) <- inspecting [Bed North 1, Bed North 2] calm {battery = [(0, 60), (4, 19.5), (4.5, 20.5)]}
     Map.size found `shouldBe` 2
     world `shouldRecord` successOf "camera Bed North 1" `comesBefore` startOf "charge"
     world `shouldRecord` successOf "charge" `comesBefore` successOf "camera Bed North 2"
     world `shouldRecord` once [Bed North 1, Bed North 2] <> exactly 1 (startOf "charge")
-  it "charges in the other house where its dock is occupied" $ do
+  it "charges in the other house when its dock is occupied" $ do
     (_, world) <- inspecting [Bed North 1] calm {battery = [(0, 60), (1, 10)], docks = occupied}
     world `shouldRecord` failureOf "charge North" `comesBefore` successOf "charge South"
     world `shouldRecord` eventually (successOf "camera Bed North 1")
-  it "tries a camera that hangs three times, with pauses, and goes on" $ do
+  it "tries a camera that hangs three times, with pauses, and continues without the picture" $ do
     (found, world) <- inspecting [Bed North 1, Bed North 2] calm {pictures = hanging}
     found `shouldBe` Map.fromList [(Bed North 1, NotSeen "timed out after 2.0 s"), seen (Bed North 2)]
     record <- happened world
     [entryTime e | e <- entries record, subject e == "camera", argument e == "Bed North 1", entryKind e == Begins]
       `shouldBe` [2.25, 5.25, 8.25]
-  it "opens the door only while no-one is near" $ do
+  it "opens the door only while no person is near" $ do
     (_, world) <- inspecting [Bed South 1] calm {someone = [(0, True), (5, False), (5.3, True), (7, False)]}
     world `shouldRecord` never (successOf "open door" `during` being "someone near" True)
     world `shouldRecord` exactly 1 (interruptionOf "open door") <> eventually (successOf "open door")
-  it "backs off when it bumps into something, and drives on" $ do
+  it "backs off when it bumps into something, and then drives on" $ do
     (found, world) <- inspecting [Bed North 1] calm {bumps = [(0, False), (1.2, True)]}
     Map.size found `shouldBe` 1
     world `shouldRecord` interruptionOf "steer to" `comesBefore` startOf "back off"
-  it "stands still without a radio link, and goes on when it is back" $ do
+  it "stands still without a radio link, and continues when the link is back" $ do
     (found, world) <- inspecting [Bed North 1, Bed North 2] calm {radio = [succeeds, hangs, hangs, succeeds]}
     Map.size found `shouldBe` 2
     world `shouldRecord` once [Bed North 1, Bed North 2] <> exactly 1 (interruptionOf "steer to")
     world `shouldRecord` whenever (interruptionOf "steer to") (withinSeconds 1 (becoming "motors" False))
-  it "does what the mode says, and comes back to its list" $ do
+  it "follows changes of the mode, and then continues its list" $ do
     (found, world) <- inspecting [Bed North 1, Bed North 2] calm {orders = switched}
     Map.size found `shouldBe` 2
     world `shouldRecord` once [Bed North 1, Bed North 2] <> exactly 1 (startOf "joystick")
     world `shouldRecord` withinSeconds 2.5 (startOf "camera Bed North 1")
-  it "keeps a log, and goes on without" $ do
+  it "writes a log, and continues when that fails" $ do
     written <- newIORef []
     _ <- inspecting [Bed North 1] calm {logged = \line -> modifyIORef written (line :)}
     readIORef written `shouldReturn` ["Bed North 1 ...", "mode: Auto"]
@@ -96,14 +96,14 @@ missions = do
 
 manySchedules :: Spec
 manySchedules = do
-  it "stops its motors and parks its arm, whenever the emergency stop is pressed" $
+  it "stops its motors and parks its arm when the emergency stop is pressed, at any time" $
     for_ (quarters 24) $ \moment ->
       explored 5 calm {emergency = pressedAt moment, battery = [(0, 100), (3, 15)]} $ \world run -> do
         case outcome run of
           Failing e | Just EmergencyStopped <- fromException e -> pure ()
           other -> expectationFailure (explain other)
         world `shouldRecord` safely <> stopped
-  it "inspects each bed once, whatever interrupts it" $
+  it "inspects each bed once, with interruptions at any time" $
     for_ (quarters 16) $ \moment ->
       explored 4 (interruptedAt moment) $ \world run -> do
         found <- returned run
@@ -122,18 +122,18 @@ manySchedules = do
     beds <- newBeds [Bed North 1, Bed South 1]
     simulated (rover hardware beds) >>= property world
 
--- | What must hold of every mission.
+-- | This must hold for every mission.
 safely :: Claim
 safely = never (being "motors" True `overlapping` being "arm out" True) <> once [Bed North 1, Bed South 1]
 
--- | What must hold when the emergency stop was pressed: a tenth of a second later the
--- motors are off for good, and in the end the arm is parked.
+-- | This must hold when the emergency stop is pressed: a tenth of a second later the motors
+-- are off and stay off, and the arm is parked at the end.
 stopped :: Claim
 stopped =
   whenever (becoming later True) (always (being "motors" False))
     <> whenever (becoming "emergency stop" True) (eventually (successOf "park arm"))
 
--- | No bed is inspected again.
+-- | No bed is inspected again after a success.
 once :: [Bed] -> Claim
 once = foldMap $ \bed ->
   let name = "camera " ++ show bed

@@ -25,7 +25,8 @@ spec = do
       runs (n + m + 1) n m (\clock one two -> Tick.ticked clock one >> Tick.ticked clock two)
         `shouldReturn` Gave ()
 
--- | Composes two actions of so many ticks each, and gives them up to a limit.
+-- | Runs a composition of two actions, with a limit of ticks. The other numbers are the ticks
+-- that each action takes.
 runs :: Int -> Int -> Int -> (Tick.Clock -> Tick.Node -> Tick.Node -> IO ()) -> IO (Ending ())
 runs limit n m composition = do
   clock <- Tick.newClock limit

@@ -1,5 +1,5 @@
 -- |
--- The tutorial "Testing a robot": what it shows is what there is, and what happens.
+-- The tutorial "Testing a robot": the code and the output that it shows are real.
 module Examples.TestingARobotSpec (spec) where
 
 import Control.Exception (throwIO, try)
@@ -17,35 +17,35 @@ spec :: Spec
 spec = guarded $ do
   describe "The rover" rover
   describe "The first version" $ do
-    it "does well when nothing happens at the same time" $
+    it "holds when nothing happens at the same time" $
       for_ [3, 7, 12] $ \moment ->
         trial (mission goHomeAtFirst) [(0, False), (moment, True)] (simulate >=> well)
     it "fails under random schedules, as the page says" $
       wholeMission goHomeAtFirst (randomly 1000) `failsAs` 1
     it "fails under some schedule of the way home, as the page says" $
       wayHome goHomeAtFirst (exhaustively 1) `failsAs` 2
-    it "fails again by the schedule that the page shows" $ do
+    it "fails again under the schedule that the page shows" $ do
       found <- try (wayHome goHomeAtFirst (exhaustively 1))
       again <- try (wayHome goHomeAtFirst (replaying (either failing (const NonPreemptive) found)))
       either (show . reason) show again `shouldBe` either (show . reason) show found
       either (length . failingSteps) (const 0) again `shouldBe` either (length . failingSteps) (const (-1)) found
   describe "A failed expectation of hspec" $ do
-    it "reads as hspec prints it, as the page says" $
+    it "is shown as by hspec, as the page says" $
       charged 20 (exhaustively 0) `failsAs` 5
-    it "comes with fewer steps, if they are narrowed, as the page says" $
+    it "has fewer steps if they are narrowed, as the page says" $
       charged 20 motorOnly `failsAs` 6
-    it "of any kind reads as hspec prints it" $ do
+    it "of any kind is shown as by hspec" $ do
       let shown expectation = either asHspec (const "it held") <$> try expectation
       shown ((1 :: Int) `shouldBe` 2) `shouldReturn` "expected: 2\n but got: 1"
       shown (expectationFailure "no") `shouldReturn` "no"
       shown (throwIO (userError "x") :: Expectation) `shouldReturn` "user error (x)"
   describe "The page" $ do
-    it "shows the modules' own text" $ do
+    it "shows the text of the modules" $ do
       modules <- traverse (fmap lines . readFile) sources
       shown <- blocks "haskell"
       length shown `shouldSatisfy` (>= 5)
       for_ shown $ \block -> block `shouldSatisfy` \text -> any (text `isInfixOf`) modules
-    it "shows what exploring the mended version says" $ do
+    it "shows the reports for the corrected version" $ do
       said <- traverse (fmap show) [wholeMission goHome (randomly 1000), wayHome goHome (exhaustively 2)]
       shown <- take 2 . drop 2 <$> blocks "text"
       concat shown `shouldBe` said
@@ -73,7 +73,7 @@ rover = do
   it "stops its motor in reality" $
     trial (\it' -> untilButton it' (goHome it')) [(0, True)] id
 
--- | It is not as expected, and says so word for word as the text of this number on the page.
+-- | The exploration fails, and its output is the page's text block with this number.
 failsAs :: IO Report -> Int -> Expectation
 failsAs exploration n = do
   said <- either show (("nothing fails: " ++) . show) <$> (try exploration :: IO (Either Counterexample Report))
@@ -81,20 +81,20 @@ failsAs exploration n = do
   for_ (take 1 (drop (n - 1) shown ++ [[]])) $ \text ->
     unless (pieces text `inOrder` lines said) (said `shouldBe` unlines text)
 
--- | The page leaves out lines where it has three dots at the margin.
+-- | The parts of a text. A line of three dots on the page stands for omitted lines.
 pieces :: [String] -> [[String]]
 pieces text = case break (== "...") text of
   (piece, _ : more) -> piece : pieces more
   (piece, []) -> [piece]
 
--- | Whether the text consists of these pieces, with anything in between.
+-- | Whether the text consists of these pieces, with any lines in between.
 inOrder :: [[String]] -> [String] -> Bool
 inOrder [] text = null text
 inOrder [piece] text = piece == text
 inOrder (piece : more) text =
   piece `isPrefixOf` text && any (inOrder more) (tails (drop (length piece) text))
 
--- | The blocks of code on the page in this language.
+-- | The code blocks of the page in this language.
 blocks :: String -> IO [[String]]
 blocks language = go . lines <$> readFile "docs/testing-a-robot.md"
  where

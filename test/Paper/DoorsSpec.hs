@@ -1,6 +1,6 @@
 -- |
--- The versions of the paper's long example, a robot that must enter a room by one of
--- two doors and never run out of battery: what it does, step by step.
+-- The versions of the paper's long example, a robot that must enter a room by one of two doors
+-- and never run out of battery: its actions, step by step.
 module Paper.DoorsSpec (spec) where
 
 import Control.Exception (throwIO)
@@ -38,13 +38,13 @@ spec = guarded $ do
     inEveryVersion Introduction.bt "perform task"
     eachDoorThreeTimes Introduction.bt "perform task"
 
--- As printed; "Paper.ErrataSpec" has what is wrong with it.
+-- As printed; its errors are in "Paper.ErrataSpec".
 frontDoorFirst :: Spec
 frontDoorFirst = do
   it "takes the back door when the front door is closed" $
     playing still [] FrontDoorFirst.bt
       `shouldReturn` (Gave (), [frontNotOpen, Did "open back door", passedBack, Did "do task"])
-  it "passes through the front door, and closes it, if that opens just then" $
+  it "passes through the front door, and closes it, if that opens at that moment" $
     playing still [During "pass through front door" (FrontDoor `doorBecomes` Open)] FrontDoorFirst.bt
       `shouldReturn` (Gave (), [passed, closed, Did "do task"])
   it "smashes the back door when that is locked" $
@@ -121,7 +121,7 @@ frontDoorUnless = do
                        , Did "do task"
                        ]
                      )
-  it "fails when nothing helps" $
+  it "fails when everything fails" $
     playing still {frontIs = Locked, backIs = Sealed} [] FrontDoorUnless.bt
       `shouldReturn` ( failedBecause "the back door is sealed"
                      , [ frontLocked
@@ -140,7 +140,7 @@ frontDoorUnless = do
                        , FailedTo "pass through back door" "somebody stands there"
                        ]
                      )
-  it "does not look for another way when the task fails" $
+  it "tries nothing else when the task fails" $
     playing still [During "do task" (failing "too heavy")] FrontDoorUnless.bt
       `shouldReturn` ( failedBecause "too heavy"
                      , [Did "open front door", passed, closed, FailedTo "do task" "too heavy"]
@@ -169,7 +169,7 @@ frontDoorUnless = do
                        , Did "do task"
                        ]
                      )
-  it "recharges as often as it must, also during the task" $
+  it "recharges repeatedly if necessary, also during the task" $
     playing
       still
       [ During "open front door" (untilInterrupted (batteryDropsTo 5))
@@ -190,12 +190,12 @@ frontDoorUnless = do
                        , Did "do task"
                        ]
                      )
-  it "recharges to the end, whatever the level is by then" $
+  it "recharges to the end, even if the battery is no longer low" $
     playing still {chargedTo = 9} [During "recharge" (batteryDropsTo 50)] FrontDoorUnless.bt
       `shouldReturn` ( Gave ()
                      , [Did "recharge", Did "open front door", passed, closed, Did "do task"]
                      )
-  it "fails when the recharging fails, and tries nothing else" $
+  it "fails when recharging fails, and tries nothing else" $
     playing still {chargedTo = 9} [During "recharge" (failing "no current")] FrontDoorUnless.bt
       `shouldReturn` (failedBecause "no current", [FailedTo "recharge" "no current"])
 
@@ -213,26 +213,26 @@ batteryLow = do
 
 fallbackOverList :: Spec
 fallbackOverList = do
-  it "is done with the first door that opens" $
+  it "ends with the first door that opens" $
     playing still [] (FallbackOverList.fallback [frontDoor, backDoor] open)
       `shouldReturn` (Gave (), [Did "open front door"])
-  it "goes on to the next door when one does not open" $
+  it "tries the next door when one does not open" $
     playing still {frontIs = Locked} [] (FallbackOverList.fallback [frontDoor, backDoor] open)
       `shouldReturn` (Gave (), [frontLocked, Did "open back door"])
 
 attempts :: Spec
 attempts = do
-  it "tries so many times" $
+  it "tries the given number of times" $
     playing still {frontIs = Locked} [] (Attempt.attempt (3 :: Int) (open frontDoor))
       `shouldReturn` (FailedWith (show Failed), [frontLocked, frontLocked, frontLocked])
-  it "is done when a try succeeds" $
+  it "ends when a try succeeds" $
     playing still {frontIs = Jammed 1} [] (Attempt.attempt (3 :: Int) (open frontDoor))
       `shouldReturn` (Gave (), [FailedTo "open front door" "the front door is jammed", Did "open front door"])
-  it "tries nothing with none" $
+  it "tries nothing when the number is zero" $
     playing still [] (Attempt.attempt (0 :: Int) (open frontDoor))
       `shouldReturn` (FailedWith (show Failed), [])
 
--- | What is the same in the versions that go over all the doors that there are.
+-- | The tests for all versions that find the doors and try each.
 inEveryVersion :: Behavior () -> String -> Spec
 inEveryVersion bt task = do
   it "enters by the front door, closes it and does the task" $
@@ -279,7 +279,7 @@ inEveryVersion bt task = do
   it "fails when it finds no doors" $
     playing still [During "find doors" (failing "too dark")] bt
       `shouldReturn` (failedBecause "too dark", [FailedTo "find doors" "too dark"])
-  it "does not look for another door when the task fails" $
+  it "tries no other door when the task fails" $
     playing still [During task (failing "too heavy")] bt
       `shouldReturn` ( failedBecause "too heavy"
                      , [found, Did "open front door", passed, closed, FailedTo task "too heavy"]
@@ -310,7 +310,7 @@ eachDoorOnce = do
                        , Did "do task"
                        ]
                      )
-  it "fails with what was wrong with the last door when none opens" $
+  it "fails with the last door's failure when none opens" $
     playing still {frontIs = Locked, backIs = Sealed} [] EachDoor.bt
       `shouldReturn` ( failedBecause "the back door is sealed"
                      , [found, frontLocked, FailedTo "open back door" "the back door is sealed"]
@@ -331,7 +331,7 @@ eachDoorThreeTimes bt task = do
                        , Did task
                        ]
                      )
-  it "takes the front door when that opens at the third try" $
+  it "takes the front door when it opens at the third try" $
     playing still {frontIs = Jammed 2} [] bt
       `shouldReturn` ( Gave ()
                      , [ found
@@ -343,7 +343,7 @@ eachDoorThreeTimes bt task = do
                        , Did task
                        ]
                      )
-  it "tries all of it three times, not only the opening" $
+  it "tries the whole entering three times, not only the opening" $
     playing
       still
       [ During "pass through front door" (failing "somebody stands there")
@@ -362,13 +362,13 @@ eachDoorThreeTimes bt task = do
                        , Did task
                        ]
                      )
-  it "fails with what was wrong with the last door when none opens" $
+  it "fails with the last door's failure when none opens" $
     playing still {frontIs = Locked, backIs = Sealed} [] bt
       `shouldReturn` ( failedBecause "the back door is sealed"
                      , [found, frontLocked, frontLocked, frontLocked]
                          ++ replicate 3 (FailedTo "open back door" "the back door is sealed")
                      )
-  it "counts anew after it has recharged" $
+  it "starts to count again after it has recharged" $
     playing
       still {frontIs = Locked}
       [ During "open front door" (\_ -> pure ())

@@ -1,6 +1,6 @@
 -- |
--- What is wrong with the paper as it is printed, shown; and what this package does
--- instead. In the order of the table of errata.
+-- The errors of the paper as printed, and what this package does instead, in the order of
+-- the table of errata.
 module Paper.ErrataSpec (spec) where
 
 import Control.Concurrent.STM (modifyTVar', newTVarIO, readTVar, readTVarIO)
@@ -30,7 +30,7 @@ import World
 spec :: Spec
 spec = guarded $ do
   describe "passDoor, Section 3.1" $
-    it "as printed does not type" $
+    it "as printed has a type error" $
       playing still [] (void PassDoor.passDoor) >>= (`shouldSatisfy` endedByTypeError)
 
   describe "a sequence as a reactive selection, Section 3.2" $
@@ -44,7 +44,7 @@ spec = guarded $ do
     it "as printed closes the door at once when it is outside" $
       playing still {frontIs = Open} [] MovedOut.bt
         `shouldReturn` (Gave (), [Did "close front door"])
-    it "with `not` passes through to the end, and comes back when it is moved out" $
+    it "with `not` passes through to the end, and passes through again when it is moved out" $
       playing
         still {frontIs = Open}
         [During "close front door" (untilInterrupted (InsideRoom `becomes` False))]
@@ -61,14 +61,14 @@ spec = guarded $ do
     for_ [("fallback", FallbackByCatch.fallback), ("?", (FallbackByCatch.?))] $ \(name, orElse) ->
       it (name ++ " as printed runs its second behaviour masked") $
         (failed `orElse` (show <$> getMaskingState)) `shouldReturn` show MaskedInterruptible
-    it "ours does not" $
+    it "in this package does not" $
       (failed ? getMaskingState) `shouldReturn` Unmasked
 
   describe "the first version, Section 6" $ do
-    it "as printed opens the door that is open, and does the task without passing through" $
+    it "as printed opens the front door although it is open, and does the task without passing through" $
       playing still {frontIs = Open} [] FrontDoorFirst.bt
         `shouldReturn` (Gave (), [Did "open front door", Did "do task"])
-    it "as printed does not open the door that is closed" $
+    it "as printed does not open the front door although it is closed" $
       playing still {backIs = Sealed} [] FrontDoorFirst.bt
         `shouldReturn` ( failedBecause "the back door is sealed"
                        , [ FailedTo "pass through front door" "the front door is not open"
@@ -81,35 +81,35 @@ spec = guarded $ do
     it "as printed faults when everything has failed, and ? does not catch that" $ do
       (FallbackOverList.fallback doors (const failed) :: Behavior ()) `shouldThrow` patternMatchFail
       (FallbackOverList.fallback doors (const failed) ? pure "recovered") `shouldThrow` patternMatchFail
-    it "ours fails with the last failure, and ? catches that" $ do
+    it "in this package fails with the last failure, which ? catches" $ do
       ending (Paper.fallback doors (failWith . show) :: Behavior ())
         `shouldReturn` failedBecause (show BackDoor)
       (Paper.fallback doors (const failed) ? pure "recovered") `shouldReturn` "recovered"
       (Paper.fallback (drop 2 doors) pure ? pure FrontDoor) `shouldReturn` FrontDoor
 
   describe "attempt, Section 6" $ do
-    it "as printed does not type at its use" $
+    it "as printed has a type error where it is used" $
       playing still [] (void ThreeTimes.bt) >>= (`shouldSatisfy` endedByTypeError)
     it "as printed never ends for a negative number" $
       counting (Attempt.attempt (-1 :: Int)) `shouldReturn` (FaultedWith (show enough), 1000)
     it "as printed loses the last failure" $
       ending (Attempt.attempt (2 :: Int) (failWith "stuck") :: Behavior ())
         `shouldReturn` FailedWith (show Failed)
-    it "ours fails for a negative number, and runs nothing" $
+    it "in this package fails for a negative number, and runs nothing" $
       counting (Paper.attempt (-1)) `shouldReturn` (FailedWith (show Failed), 0)
-    it "ours throws the last failure" $
+    it "in this package throws the last failure" $
       ending (Paper.attempt 2 (failWith "stuck" :: Behavior ()))
         `shouldReturn` failedBecause "stuck"
  where
   doors = [FrontDoor, BackDoor]
   patternMatchFail = const True :: Selector PatternMatchFail
 
--- | Whether GHC had put off a type error, until the robot came to it.
+-- | Whether it ended with a type error that GHC had deferred to run time.
 endedByTypeError :: (Ending a, [Step]) -> Bool
 endedByTypeError (FaultedWith why, _) = "(deferred type error)" `isInfixOf` why
 endedByTypeError _ = False
 
--- | How often the behaviour is tried that always fails, until it has had enough.
+-- | How often a behaviour that always fails is tried; it faults at the thousandth try.
 counting :: (Behavior () -> Behavior ()) -> IO (Ending (), Int)
 counting trying = do
   count <- newTVarIO 0

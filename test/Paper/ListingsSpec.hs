@@ -1,6 +1,6 @@
 -- |
--- The listings of Sections 3 to 5: what the robot does, step by step. (Those that do
--- not do what their text says are in "Paper.ErrataSpec".)
+-- The listings of Sections 3 to 5: the robot's actions, step by step. (The listings that
+-- contradict the paper's text are in "Paper.ErrataSpec".)
 module Paper.ListingsSpec (spec) where
 
 import Control.Exception (throwIO)
@@ -132,19 +132,19 @@ whenReactive = do
         `shouldReturn` (Gave (), [InterruptedIn "recharge", Did "task"])
 
   describe "Paper.SequenceAsSelection" $ do
-    it "goes on to the second action when the first is known to be done" $
+    it "starts the second action when the condition for the end of the first is true" $
       playing still [During "a1" (untilInterrupted (C1 `becomes` True))] SequenceAsSelection.bt
         `shouldReturn` (Gave (), [InterruptedIn "a1", Did "a2"])
-    it "skips the first action when it is known to be done" $
+    it "skips the first action when that condition is true at the start" $
       playingIn still [] (\world -> (C1 `becomes` True) world >> SequenceAsSelection.bt)
         `shouldReturn` (Gave (), [Did "a2"])
 
   describe "Paper.Circle" $ do
-    it "drives in a circle, then goes there" $
+    it "drives in a circle, then moves to the box" $
       playing still [] Circle.bt `shouldReturn` (Gave (), [Did "circle", Did "move to box"])
-    it "never goes there when nobody keeps the artificial condition" $
+    it "with an artificial condition does not move to the box if that is never set" $
       playing still [] Circle.artificial `shouldReturn` (Gave (), [Did "circle"])
-    it "goes there when somebody does" $
+    it "with an artificial condition moves to the box when that is set" $
       playing still [During "circle" (untilInterrupted (C1 `becomes` True))] Circle.artificial
         `shouldReturn` (Gave (), [InterruptedIn "circle", Did "move to box"])
 
@@ -203,7 +203,7 @@ preempting = do
           [During "pass through front door" unwatched, During "close front door" unwatched]
           bt
           `shouldReturn` (Gave (), [Did "pass through front door", Did "close front door"])
-      it "leaves the door alone when it could not pass" $
+      it "does not close the door when it could not pass through" $
         playing still [] bt
           `shouldReturn` ( failedBecause "the front door is not open"
                          , [FailedTo "pass through front door" "the front door is not open"]
@@ -233,7 +233,7 @@ oneSided = do
                        )
 
   describe "Paper.MonitorBattery" $ do
-    it "recharges to the end, whatever the level is by then, and then does the task" $
+    it "recharges to the end, even if the battery is no longer low, and then does the task" $
       playing
         still
         [ During "task" (untilInterrupted (batteryDropsTo 9))
@@ -244,7 +244,7 @@ oneSided = do
         `shouldReturn` ( Gave ()
                        , [InterruptedIn "task", Did "recharge", InterruptedIn "task", Did "recharge", Did "task"]
                        )
-    it "fails when the recharging fails" $
+    it "fails when recharging fails" $
       playing still {chargedTo = 9} [During "recharge" (failing "no current")] MonitorBattery.bt
         `shouldReturn` (failedBecause "no current", [FailedTo "recharge" "no current"])
 
@@ -287,10 +287,10 @@ specification :: Spec
 specification = do
   for_ [("Paper.Then", Then.bt), ("Paper.ThenBind", ThenBind.bt), ("Paper.ThenDo", ThenDo.bt)] $
     \(name, bt) -> describe name $ do
-      it "does the one, then the other" $
+      it "does the first, then the second" $
         playing still [] bt
           `shouldReturn` (Gave (), [Did "open front door", Did "pass through front door"])
-      it "does not do the other when the one fails" $
+      it "does not do the second when the first fails" $
         playing still {frontIs = Locked} [] bt
           `shouldReturn` ( failedBecause "the front door is locked"
                          , [FailedTo "open front door" "the front door is locked"]
@@ -312,7 +312,7 @@ specification = do
 
   describe "Paper.FallbackByCatch" $
     for_ [("fallback", FallbackByCatch.fallback), ("?", (FallbackByCatch.?))] $ \(name, orElse) ->
-      it (name ++ ": the second behaviour runs when the first fails, and only then") $ do
+      it (name ++ " runs its second behaviour when the first fails, and only then") $ do
         (failed `orElse` pure "second") `shouldReturn` "second"
         (pure "first" `orElse` pure "second") `shouldReturn` "first"
         ending (throwIO (Fault "bug") `orElse` pure "second")

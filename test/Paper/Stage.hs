@@ -1,8 +1,8 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Where the specs play the listings: a fresh world for each, a script that says what
--- happens while an action lasts, and the robot's steps.
+-- Runs the listings: each in a new world, with a script of changes during the actions, and a
+-- log of the robot's steps.
 module Paper.Stage
   ( -- * Playing a listing
     playing
@@ -16,7 +16,7 @@ module Paper.Stage
   , failing
   , unwatched
 
-    -- * What happens to the world
+    -- * Changes of the world
   , becomes
   , doorBecomes
   , batteryDropsTo
@@ -39,12 +39,12 @@ import Robot (inWorld)
 import Support (Ending (..), ending, hang)
 import World
 
--- | @playing setting script listing@: how the listing ended, and what the robot did.
--- Every scene of the script must have been played.
+-- | @playing setting script listing@: how the listing ended, and what the robot did. All
+-- scenes of the script must have been used.
 playing :: Setting -> [Scene] -> Behavior a -> IO (Ending a, [Step])
 playing stage script listing = playingIn stage script (const listing)
 
--- | 'playing' where something happens to the world before.
+-- | 'playing' with access to the world, to change it first.
 playingIn :: Setting -> [Scene] -> (World -> Behavior a) -> IO (Ending a, [Step])
 playingIn stage script listing = do
   scenes <- newTVarIO script
@@ -61,8 +61,7 @@ playingIn stage script listing = do
   events <- happened world
   pure (end, steps events)
 
--- | What the robot did. It does one thing at a time: an action ends, and only then
--- another begins.
+-- | What the robot did. It does one action at a time: each ends before the next begins.
 data Step
   = Did String
   | FailedTo String String
@@ -93,8 +92,8 @@ steps = \case
 failedBecause :: String -> Ending a
 failedBecause = FailedWith . show . FailedBecause
 
--- | What happens while the action of this name lasts: the first such scene the first
--- time, and so on. An action for which there is no scene is done at once.
+-- | What happens during the action with this name: the first such scene in its first run, and
+-- so on. An action without a scene ends at once.
 data Scene = During String (World -> Behavior ())
 
 -- | The action goes on after the scene, until it is interrupted.
@@ -104,10 +103,9 @@ untilInterrupted scene world = scene world >> hang
 failing :: String -> World -> Behavior ()
 failing why _ = failWith why
 
--- | Fails when a thread of the library is there, to watch something or to run the
--- action in.
+-- | Fails when the library has a thread, for a sensor or for a branch.
 unwatched :: World -> Behavior ()
-unwatched _ = liveThreadCount >>= \n -> when (n > 0) (failWith "somebody is watching")
+unwatched _ = liveThreadCount >>= \n -> when (n > 0) (failWith "a thread is running")
 
 becomes :: Condition -> Bool -> World -> Behavior ()
 becomes condition value world = atomically (writeTVar (holds world condition) value)
@@ -118,7 +116,7 @@ doorBecomes door state world = atomically (writeTVar (doorIs world door) state)
 batteryDropsTo :: Double -> World -> Behavior ()
 batteryDropsTo percent world = setBattery world percent
 
--- | While the behaviour runs, no condition of the world can be sensed: that fails.
+-- | While the behaviour runs, reading a condition of the world fails.
 withoutSensors :: Behavior a -> World -> Behavior a
 withoutSensors behavior world = inWorld blind behavior
  where

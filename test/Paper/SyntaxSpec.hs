@@ -1,8 +1,7 @@
 {-# LANGUAGE RebindableSyntax #-}
 
 -- |
--- "Behavior.Paper" itself: what it overloads means what it stands for, on ordinary
--- values too.
+-- "Behavior.Paper" itself: its overloaded syntax, on behaviours and on ordinary values.
 module Paper.SyntaxSpec (spec) where
 
 import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVarIO, writeTVar)
@@ -15,46 +14,46 @@ import Support (Ending (..), Fault (..), ending, guarded, hang)
 spec :: Spec
 spec = guarded $ do
   describe "if" $ do
-    it "chooses by a Bool, between anything" $
+    it "chooses by a Bool, between values of any type" $
       [if True then 'y' else 'n', if False then 'y' else 'n'] `shouldBe` "yn"
     it "chooses by a behaviour, between behaviours" $ do
       (if return True then return 'y' else return 'n') `shouldReturn` 'y'
       (if return False then return 'y' else return 'n') `shouldReturn` 'n'
-    it "runs its condition once, before" $
-      noting (\note -> if note "test" >> return True then note "yes" else note "no")
+    it "runs its condition once, first" $
+      logging (\note -> if note "test" >> return True then note "yes" else note "no")
         `shouldReturn` (Gave (), ["test", "yes"])
     it "runs nothing else when its condition fails or faults" $ do
-      noting (\note -> if blind then note "yes" else note "no") `shouldReturn` (blindness, [])
-      noting (\note -> if broken then note "yes" else note "no") `shouldReturn` (breakage, [])
+      logging (\note -> if failing then note "yes" else note "no") `shouldReturn` (failure, [])
+      logging (\note -> if faulting then note "yes" else note "no") `shouldReturn` (fault, [])
   describe "unless" $ do
     it "runs the behaviour when the Bool is false" $
-      noting (\note -> unless False (note "a") >> unless True (note "b"))
+      logging (\note -> unless False (note "a") >> unless True (note "b"))
         `shouldReturn` (Gave (), ["a"])
     it "runs the behaviour when the condition is false" $
-      noting (\note -> unless (return False) (note "a") >> unless (return True) (note "b"))
+      logging (\note -> unless (return False) (note "a") >> unless (return True) (note "b"))
         `shouldReturn` (Gave (), ["a"])
     it "runs nothing when the condition fails or faults" $ do
-      noting (\note -> unless blind (note "a")) `shouldReturn` (blindness, [])
-      noting (\note -> unless broken (note "a")) `shouldReturn` (breakage, [])
+      logging (\note -> unless failing (note "a")) `shouldReturn` (failure, [])
+      logging (\note -> unless faulting (note "a")) `shouldReturn` (fault, [])
   describe "not" $ do
-    it "is the Prelude's on a Bool" $
+    it "on a Bool is the Prelude's not" $
       map not [False, True] `shouldBe` [True, False]
     it "is the opposite of a condition" $ do
       not (return False) `shouldReturn` True
       not (return True) `shouldReturn` False
-    it "of a condition that fails or faults does the same" $ do
-      ending (not blind) `shouldReturn` blindness
-      ending (not broken) `shouldReturn` breakage
+    it "of a condition that fails or faults throws the same" $ do
+      ending (not failing) `shouldReturn` failure
+      ending (not faulting) `shouldReturn` fault
   describe "&" $ do
-    it "is && on Bool" $
+    it "on Bool is &&" $
       [l & r | l <- [False, True], r <- [False, True]] `shouldBe` [False, False, False, True]
-    it "is whether both conditions are true" $
+    it "is true when both conditions are true" $
       mapM (\(l, r) -> return l & return r) [(False, False), (False, True), (True, False), (True, True)]
         `shouldReturn` [False, False, False, True]
     it "tests the second only if the first is true" $ do
-      (return False & broken) `shouldReturn` False
-      ending (return True & broken) `shouldReturn` breakage
-      ending (blind & broken) `shouldReturn` blindness
+      (return False & faulting) `shouldReturn` False
+      ending (return True & faulting) `shouldReturn` fault
+      ending (failing & faulting) `shouldReturn` failure
     it "binds looser than > and ==" $
       (1 == one & two > 1) `shouldBe` True
   describe ">" $ do
@@ -66,31 +65,31 @@ spec = guarded $ do
       ((return one :: Behavior Int) > 1) `shouldReturn` False
     it "can be a section" $
       filter (> one) [one, two] `shouldBe` [two]
-    it "of a behaviour that fails or faults does the same" $ do
+    it "of a behaviour that fails or faults throws the same" $ do
       ending ((failed :: Behavior Int) > 1) `shouldReturn` FailedWith (show Failed)
-      ending ((throwing :: Behavior Int) > 1) `shouldReturn` breakage
+      ending ((throwing :: Behavior Int) > 1) `shouldReturn` fault
   describe "fallback" $ do
-    it "is that of two behaviours" $ do
+    it "takes two behaviours" $ do
       fallback (return 'a' :: Behavior Char) (return 'b') `shouldReturn` 'a'
       fallback (failed :: Behavior Char) (return 'b') `shouldReturn` 'b'
-      ending (fallback (throwing :: Behavior Char) (return 'b')) `shouldReturn` breakage
-    it "is that over a list" $ do
+      ending (fallback (throwing :: Behavior Char) (return 'b')) `shouldReturn` fault
+    it "takes a list and a function" $ do
       fallback [1, 2, 3 :: Int] (\n -> if n > 1 then return n else failed) `shouldReturn` 2
       ending (fallback "ab" (\door -> failWith [door] :: Behavior ()))
         `shouldReturn` FailedWith (show (FailedBecause "b"))
       ending (fallback "" return) `shouldReturn` FailedWith (show Failed)
-      ending (fallback "ab" (\_ -> throwing :: Behavior ())) `shouldReturn` breakage
+      ending (fallback "ab" (\_ -> throwing :: Behavior ())) `shouldReturn` fault
   describe "attempt" $ do
     it "tries a behaviour" $
-      noting (\note -> attempt 3 (note "try" >> failed)) `shouldReturn` (gaveUp, ["try", "try", "try"])
+      logging (\note -> attempt 3 (note "try" >> failed)) `shouldReturn` (gaveUp, ["try", "try", "try"])
     it "tries a behaviour that takes arguments, with the same arguments" $
-      noting (\note -> attempt 2 (\x y -> note (x ++ y) >> failed) "a" "b")
+      logging (\note -> attempt 2 (\x y -> note (x ++ y) >> failed) "a" "b")
         `shouldReturn` (gaveUp, ["ab", "ab"])
-    it "tries nothing with none or fewer" $ do
-      noting (\note -> attempt 0 note "try") `shouldReturn` (gaveUp, [])
-      noting (\note -> attempt (-1) (note "try")) `shouldReturn` (gaveUp, [])
+    it "tries nothing for zero or a negative number" $ do
+      logging (\note -> attempt 0 note "try") `shouldReturn` (gaveUp, [])
+      logging (\note -> attempt (-1) (note "try")) `shouldReturn` (gaveUp, [])
     it "is attemptNTimes" $
-      noting (\note -> attemptNTimes 2 (\x -> note x >> failed) "try")
+      logging (\note -> attemptNTimes 2 (\x -> note x >> failed) "try")
         `shouldReturn` (gaveUp, ["try", "try"])
   describe "rSelect" $ do
     it "can be given a Bool" $ do
@@ -100,8 +99,8 @@ spec = guarded $ do
       state <- newTVarIO False
       rSelect (not (readTVarIO state)) (write state True >> hang) (return 'r') `shouldReturn` 'r'
     it "fails or faults when its condition does" $ do
-      noting (\note -> rSelect blind (note "l") (note "r")) `shouldReturn` (blindness, [])
-      noting (\note -> rSelect broken (note "l") (note "r")) `shouldReturn` (breakage, [])
+      logging (\note -> rSelect failing (note "l") (note "r")) `shouldReturn` (failure, [])
+      logging (\note -> rSelect faulting (note "l") (note "r")) `shouldReturn` (fault, [])
   describe "monitor" $ do
     it "can be given a Bool" $
       monitor False (return ()) (return 't') `shouldReturn` 't'
@@ -111,15 +110,15 @@ spec = guarded $ do
         (readTVarIO level >>= \n -> if n > 2 then return n else write level 0 >> hang)
         `shouldReturn` 3
     it "fails or faults when its condition does" $ do
-      noting (\note -> monitor blind (note "r") (note "t")) `shouldReturn` (blindness, [])
-      noting (\note -> monitor broken (note "r") (note "t")) `shouldReturn` (breakage, [])
+      logging (\note -> monitor failing (note "r") (note "t")) `shouldReturn` (failure, [])
+      logging (\note -> monitor faulting (note "r") (note "t")) `shouldReturn` (fault, [])
  where
   one = 1 :: Int
   two = 2 :: Int
-  blind = failWith "blind" :: Behavior Bool
-  blindness = FailedWith (show (FailedBecause "blind"))
-  broken = throwing :: Behavior Bool
-  breakage = FaultedWith (show (Fault "broken"))
+  failing = failWith "blind" :: Behavior Bool
+  failure = FailedWith (show (FailedBecause "blind"))
+  faulting = throwing :: Behavior Bool
+  fault = FaultedWith (show (Fault "broken"))
   gaveUp = FailedWith (show Failed) :: Ending ()
 
 throwing :: Behavior a
@@ -128,10 +127,10 @@ throwing = throw (Fault "broken")
 write :: TVar a -> a -> Behavior ()
 write variable = atomically . writeTVar variable
 
--- | How a behaviour ends that is given something to note with, and what it has noted.
-noting :: ((String -> Behavior ()) -> Behavior a) -> IO (Ending a, [String])
-noting behavior = do
-  notebook <- newTVarIO []
-  end <- ending (behavior (\what -> atomically (modifyTVar' notebook (what :))))
-  notes <- readTVarIO notebook
-  return (end, reverse notes)
+-- | How a behaviour ends that writes to a log, and the log.
+logging :: ((String -> Behavior ()) -> Behavior a) -> IO (Ending a, [String])
+logging behavior = do
+  logged <- newTVarIO []
+  end <- ending (behavior (\what -> atomically (modifyTVar' logged (what :))))
+  entries <- readTVarIO logged
+  return (end, reverse entries)

@@ -1,17 +1,17 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Promises of behaviours that run side by side, and inside of one another.
+-- Promises about concurrent and nested behaviours.
 module Promises.Concurrent
-  ( -- * Stopped at its own level
+  ( -- * Stop requests in nested operators
     levels
-  , stoppedAtItsLevel
+  , stoppedAtItsOwnLevel
 
-    -- * Together
-  , companies
-  , askedTogether
+    -- * Simultaneous stop requests
+  , groups
+  , stoppedTogether
 
-    -- * The first, and left of those that tie
+    -- * Ties
   , relays
   , leftWins
   ) where
@@ -30,17 +30,17 @@ import qualified Promises.Language as L
 import Promises.Stage
 import Support (Cancel (..), Ending (..), hang)
 
--- * Stopped at its own level
+-- * Stop requests in nested operators
 
--- | Operators around one another, the outermost first. One of them stops what is in it;
--- if none does, the caller is cancelled.
+-- | Nested operators, the outermost first. One of them stops its branch; if none does, the
+-- caller is cancelled.
 newtype Levels = Levels [Level]
   deriving (Show)
 
 data Level
-  = -- | Does nothing but to run what is in it.
+  = -- | Only runs the next level.
     Around Place
-  | -- | Stops what is in it, after so many ticks or by a neighbour.
+  | -- | Stops the next level after the given number of ticks, or when another branch ends.
     ByTimeout Int
   | ByNeighbour
   deriving (Eq, Show)
@@ -61,19 +61,19 @@ levels size = do
  where
   around = Around <$> elements [minBound .. maxBound]
 
--- | The operator that stops gets past its stop, those in it do not, whatever they have
--- to fall back on; and those around it know nothing of it.
-stoppedAtItsLevel :: Stage -> Language -> Levels -> IO ()
-stoppedAtItsLevel stage l (Levels these) = do
+-- | The operator that stops its branch continues after the stop. The operators inside do not
+-- continue, not even with a fallback; those around it are not affected.
+stoppedAtItsOwnLevel :: Stage -> Language -> Levels -> IO ()
+stoppedAtItsOwnLevel stage l (Levels these) = do
   inside <- newTVarIO False
-  wentOn <- newJournal
+  continued <- newLog
   let bottom = (atomically (writeTVar inside True) >> hang) `catch` \e -> pause stage 1 >> throwIO (e :: SomeException)
       stops = any isStop these
       build _ [] = bottom
       build n (level : further) =
         let act = build (n + 1) further
-         in (level `doing` (act `fallingBack` n)) >> when (isStop level) (enter wentOn n)
-      fallingBack act n = L.fallback l act (enter wentOn (100 + n :: Int))
+         in (level `doing` (act `fallingBack` n)) >> when (isStop level) (append continued n)
+      fallingBack act n = L.fallback l act (append continued (100 + n :: Int))
       doing level act = case level of
         Around InParallel -> L.parallel l act hang
         Around InBoth -> L.both l (pure ()) act
@@ -90,128 +90,128 @@ stoppedAtItsLevel stage l (Levels these) = do
         ByTimeout n -> L.fallback l (L.timeout l (fromIntegral n * tick stage) act) (pure ())
       whole
         | stops = calling stage pure [] (build 0 these)
-        | otherwise = calling stage (\() -> atomically (readTVar inside >>= check)) [(0, Changes ()), (0, CancelsIt)] (build 0 these)
+        | otherwise = calling stage (\() -> atomically (readTVar inside >>= check)) [(0, Changes ()), (0, CancelsCaller)] (build 0 these)
   end <- run stage whole
-  done <- journal wentOn
+  done <- readLog continued
   let level = length (takeWhile (not . isStop) these)
   case end of
     Gave (Gave ()) | stops, done == [level] -> pure ()
     Gave (CancelledBy _) | not stops, null done -> pure ()
-    _ -> broken ("it ended: " ++ show end ++ ", and what went on is " ++ show done)
+    _ -> broken ("it ended: " ++ show end ++ ", and these levels continued: " ++ show done)
 
 isStop :: Level -> Bool
 isStop = \case
   Around _ -> False
   _ -> True
 
--- * Together
+-- * Simultaneous stop requests
 
--- | Behaviours side by side that have to stop at the same time.
-data Company = Company Way [Manner] Cause
+-- | Concurrent behaviours that are stopped at the same time.
+data Group = Group Composition [StopHandling] Cause
   deriving (Show)
 
-data Way = AsFirst | AsAll | AsPair | AsRace | AsForks | AsTaskAndSensor
+data Composition = AsFirst | AsAll | AsPair | AsRace | AsForks | AsTaskAndSensor
   deriving (Eq, Show)
 
--- | How one of them is when it is asked to stop.
-data Manner
-  = -- | It hears at once; its cleanup waits for the others to hear.
+-- | How one of them handles its stop request.
+data StopHandling
+  = -- | It receives the request at once; its cleanup waits until the others have received
+    -- theirs.
     SlowCleanup
-  | -- | It cannot hear before the others have.
-    Deaf
+  | -- | It is masked uninterruptibly until the others have received their requests.
+    Uninterruptible
   deriving (Eq, Show)
 
 data Cause = ByCaller | ByFailure
   deriving (Eq, Show)
 
-companies :: Size -> Gen Company
-companies size = do
-  way <- elements ([AsFirst, AsAll, AsPair, AsRace] ++ [w | size == Full, w <- [AsForks, AsTaskAndSensor]])
-  n <- if size == Full && way `elem` [AsFirst, AsAll, AsForks] then choose (2, 3) else pure (2 :: Int)
-  -- If two were deaf to the end, they would wait for each other.
-  deafOne <- choose (0, 2 * n)
-  cause <- if way == AsTaskAndSensor || size == Tiny then pure ByCaller else elements [ByCaller, ByFailure]
-  pure (Company way [if k == deafOne then Deaf else SlowCleanup | k <- [1 .. n]] cause)
+groups :: Size -> Gen Group
+groups size = do
+  composition <- elements ([AsFirst, AsAll, AsPair, AsRace] ++ [w | size == Full, w <- [AsForks, AsTaskAndSensor]])
+  n <- if size == Full && composition `elem` [AsFirst, AsAll, AsForks] then choose (2, 3) else pure (2 :: Int)
+  -- Two uninterruptible ones would wait for each other.
+  uninterruptibleOne <- choose (0, 2 * n)
+  cause <- if composition == AsTaskAndSensor || size == Tiny then pure ByCaller else elements [ByCaller, ByFailure]
+  pure (Group composition [if k == uninterruptibleOne then Uninterruptible else SlowCleanup | k <- [1 .. n]] cause)
 
--- | Whoever is asked to stop waits, uninterruptibly, until all are. If they were asked
--- one after the other, that would never be.
-askedTogether :: Stage -> Language -> Company -> IO ()
-askedTogether stage l (Company way manners cause) = do
+-- | Each branch that receives its stop request waits, uninterruptibly, until all have. If the
+-- operator stopped one after the other, this would never end.
+stoppedTogether :: Stage -> Language -> Group -> IO ()
+stoppedTogether stage l (Group composition handlings cause) = do
   inside <- newTVarIO (0 :: Int)
-  heard <- newTVarIO (0 :: Int)
-  let n = length manners
-      untilHeard k = atomically (readTVar heard >>= check . (>= k))
+  received <- newTVarIO (0 :: Int)
+  let n = length handlings
+      untilReceived k = atomically (readTVar received >>= check . (>= k))
       member = \case
         SlowCleanup ->
           (atomically (modifyTVar' inside (+ 1)) >> hang) `catch` \e -> do
-            when (isCancellation e) . uninterruptibleMask_ $ atomically (modifyTVar' heard (+ 1)) >> untilHeard n
+            when (isCancellation e) . uninterruptibleMask_ $ atomically (modifyTVar' received (+ 1)) >> untilReceived n
             throwIO e
-        Deaf -> uninterruptibleMask_ $ do
+        Uninterruptible -> uninterruptibleMask_ $ do
           atomically (modifyTVar' inside (+ 1))
-          untilHeard (n - 1)
-          atomically (modifyTVar' heard (+ 1))
+          untilReceived (n - 1)
+          atomically (modifyTVar' received (+ 1))
       allInside = atomically (readTVar inside >>= check . (== n))
-      others = map member manners
+      others = map member handlings
       culprit = [allInside >> void (finish 0 Fails) | cause == ByFailure]
-      together = case (way, others ++ culprit) of
+      together = case (composition, others ++ culprit) of
         (AsAll, these) -> void (L.allOf l these)
         (AsPair, [a, b]) -> L.both l a b
         (AsRace, [a, b]) -> L.parallel l a b
         (AsForks, a : these) -> L.beside l these a
         (AsTaskAndSensor, [a, b]) -> do
-          asked <- newTVarIO (0 :: Int)
-          -- The task starts by the first reading, and the second one is the member.
+          readings <- newTVarIO (0 :: Int)
+          -- The task starts by the first reading; the second reading is the other member.
           let reading = do
-                k <- atomically (modifyTVar' asked (+ 1) >> readTVar asked)
+                k <- atomically (modifyTVar' readings (+ 1) >> readTVar readings)
                 False <$ when (k > 1) b
           L.monitor l (L.polling l (tick stage) reading) hang a
         (_, these) -> L.firstOf l these
-      deeds = case cause of
-        ByCaller -> [(0, Changes ()), (0, CancelsIt)]
+      stimuli = case cause of
+        ByCaller -> [(0, Changes ()), (0, CancelsCaller)]
         ByFailure -> [(0, Changes ())]
-  end <- run stage (calling stage (const allInside) deeds together)
+  end <- run stage (calling stage (const allInside) stimuli together)
   case (cause, end) of
     (ByCaller, Gave (CancelledBy _)) -> pure ()
     (ByFailure, Gave (FailedWith _)) -> pure ()
     _ -> broken ("it ended: " ++ show end)
 
--- * The first, and left of those that tie
+-- * Ties
 
--- | Behaviours side by side. Those in the list end one after the other, in this order
--- (and from left to right), each when the one before has ended and anybody could have
--- seen it; the rest does not end.
-data Relay = Relay Way Int [(Int, End)]
+-- | Concurrent behaviours. Those in the list end one after the other, in this order (and from
+-- left to right), each when the end of the one before is published; the others do not end.
+data Relay = Relay Composition Int [(Int, End)]
   deriving (Show)
 
 relays :: Size -> Gen Relay
 relays size = do
-  way <- elements [AsFirst, AsAll, AsPair, AsRace]
-  n <- if size == Full && way `elem` [AsFirst, AsAll] then choose (2, 3) else pure (2 :: Int)
+  composition <- elements [AsFirst, AsAll, AsPair, AsRace]
+  n <- if size == Full && composition `elem` [AsFirst, AsAll] then choose (2, 3) else pure (2 :: Int)
   first <- choose (0, n - 1)
   runners <- traverse (\k -> (,) k <$> elements [Succeeds, Fails]) [first .. n - 1]
-  let toEnd = way `elem` [AsAll, AsPair] && first > 0 && all ((== Succeeds) . snd) runners
-  -- Somebody must end it.
-  pure (Relay way n (if toEnd then [(first, Fails)] else runners))
+  let toEnd = composition `elem` [AsAll, AsPair] && first > 0 && all ((== Succeeds) . snd) runners
+  -- At least one branch must end the operator.
+  pure (Relay composition n (if toEnd then [(first, Fails)] else runners))
 
--- | The operator may look late, when several have ended. It goes by the one that ended
--- first (or failed first, where it waits for all), which here is the leftmost too.
+-- | The operator may run late, when several branches have ended. The branch that ended first
+-- decides (or failed first, if the operator waits for all), which is also the leftmost here.
 leftWins :: Stage -> Language -> Relay -> IO ()
-leftWins stage l (Relay way n runners) = do
-  batons <- traverse (const newEmptyTMVarIO) runners
-  let before = pure () : map (\baton -> atomically (takeTMVar baton) >>= untilOver stage) batons
-      runner (k, how) wait baton =
-        (k, wait >> mask_ (myThreadId >>= atomically . putTMVar baton >> finish k how))
-      lanes = zipWith3 runner runners before batons
-      these = [fromMaybe hang (lookup k lanes) | k <- [0 .. n - 1]]
-      whole = case (way, these) of
+leftWins stage l (Relay composition n runners) = do
+  threadIds <- traverse (const newEmptyTMVarIO) runners
+  let before = pure () : map (\threadId' -> atomically (takeTMVar threadId') >>= untilOver stage) threadIds
+      runner (k, how) wait threadId' =
+        (k, wait >> mask_ (myThreadId >>= atomically . putTMVar threadId' >> finish k how))
+      runs = zipWith3 runner runners before threadIds
+      these = [fromMaybe hang (lookup k runs) | k <- [0 .. n - 1]]
+      whole = case (composition, these) of
         (AsAll, _) -> sum <$> L.allOf l these
         (AsPair, [a, b]) -> 1 <$ L.both l a b
         (AsRace, [a, b]) -> firstNumber <$ L.parallel l a b
         _ -> L.firstOf l these
       firstNumber = maybe 0 fst (listToMaybe runners)
       failures = filter ((== Fails) . snd) runners
-      expected = case way of
-        _ | way `elem` [AsAll, AsPair] -> case failures of
+      expected = case composition of
+        _ | composition `elem` [AsAll, AsPair] -> case failures of
           (k, _) : _ -> FailedWith (failureOf k)
           [] -> Gave (sum (map fst runners))
         _ -> case runners of
@@ -222,6 +222,6 @@ leftWins stage l (Relay way n runners) = do
     broken ("it ended: " ++ show end ++ ", and not: " ++ show expected)
  where
   failureOf k = "Failure " ++ show (show k)
-  -- What waits for the end of a runner in a simulation throws to it. One that succeeds can
-  -- still receive that, if it was not quick enough.
-  overtaken = [CancelledBy (show (Cancel "nobody")) | any ((== Succeeds) . snd) runners]
+  -- In a simulation, waiting for the end of a thread throws an exception to it ('untilOver').
+  -- A branch that succeeds can still receive that before its end.
+  overtaken = [CancelledBy (show (Cancel "untilOver")) | any ((== Succeeds) . snd) runners]

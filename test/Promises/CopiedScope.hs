@@ -3,7 +3,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Structured concurrency once more, with the places where it goes wrong.
+-- A plain copy of the library's scopes, with optional flaws.
 module Promises.CopiedScope
   ( Flaw (..)
 
@@ -16,14 +16,14 @@ module Promises.CopiedScope
   , worker
   , outcomeOf
 
-    -- * Asking to stop
-  , ask
-  , askWithoutWaiting
+    -- * Stop requests
+  , requestStop
+  , requestStopAsync
   , Stop (..)
 
     -- * How a branch ends
   , Outcome (..)
-  , settle
+  , outcomeToIO
   ) where
 
 import Control.Concurrent (ThreadId)
@@ -37,13 +37,13 @@ import Data.Traversable (for)
 import Behavior.Internal.Failure (StoppedWithFault (..), isCancellation, isFailure)
 import Behavior.Internal.Runtime
 
--- | What can be wrong with an operator.
+-- | The flaws that an operator can have.
 data Flaw
   = ReturnsBeforeTheLoser
   | OrphansAtSecondCancel
-  | AsksTwice
+  | RequestsStopTwice
   | SwallowsCancellation
-  | TakesWhatIsThrownForItsOwn
+  | TakesForeignExceptionAsItsOwn
   | FailsWhenCancelled
   | RecoversInAHandler
   | InheritsMasking
@@ -91,7 +91,7 @@ structured flaw operator body = mask $ \restore -> do
   verdict <- try (restore (body scope))
   faults <- end scope
   cancelled <- case verdict of
-    Left e | isCancellation e || flaw /= Just TakesWhatIsThrownForItsOwn -> pure (Left e)
+    Left e | isCancellation e || flaw /= Just TakesForeignExceptionAsItsOwn -> pure (Left e)
     _ -> try (restore checkpoint)
   case (cancelled, if flaw == Just ThrowsTheRightmostFault then reverse faults else faults) of
     (Left cancellation, []) -> throwIO cancellation
@@ -105,20 +105,20 @@ end :: Scope -> IO [SomeException]
 end (Scope flaw _ branches) = do
   started <- reverse <$> readIORef branches
   case flaw of
-    Just ReturnsBeforeTheLoser -> [] <$ askWithoutWaiting started
-    Just StopsOneByOne -> concat <$> for started (\b -> ask [b] >> waitFirmly b)
-    Just OrphansAtSecondCancel -> ask started >> concat <$> traverse wait started
-    Just AsksTwice -> ask started >> concat <$> for started (\b -> wait b `onInterruption` (askByMessenger b >> waitFirmly b))
+    Just ReturnsBeforeTheLoser -> [] <$ requestStopAsync started
+    Just StopsOneByOne -> concat <$> for started (\b -> requestStop [b] >> waitUninterruptibly b)
+    Just OrphansAtSecondCancel -> requestStop started >> concat <$> traverse wait started
+    Just RequestsStopTwice -> requestStop started >> concat <$> for started (\b -> wait b `onInterruption` (requestStopByHelper b >> waitUninterruptibly b))
     Just DropsTheLosersFault -> do
-      ask started
-      byThemselves <- filterM (\(SomeBranch (Branch _ asked _)) -> not <$> readIORef asked) started
-      traverse_ waitFirmly started
-      concat <$> traverse waitFirmly byThemselves
-    _ -> ask started >> concat <$> traverse waitFirmly started
+      requestStop started
+      byThemselves <- filterM (\(SomeBranch (Branch _ requested _)) -> not <$> readIORef requested) started
+      traverse_ waitUninterruptibly started
+      concat <$> traverse waitUninterruptibly byThemselves
+    _ -> requestStop started >> concat <$> traverse waitUninterruptibly started
  where
   onInterruption act after = try act >>= either (\(_ :: SomeException) -> after) pure
   wait (SomeBranch b) = atomically (fault <$> outcomeOf b)
-  waitFirmly (SomeBranch b) = awaitUninterruptibly (atomically (fault <$> outcomeOf b))
+  waitUninterruptibly (SomeBranch b) = awaitUninterruptibly (atomically (fault <$> outcomeOf b))
   fault = \case
     Faulted e -> [e]
     _ -> []
@@ -130,10 +130,10 @@ worker :: Scope -> String -> (IO Bool -> IO a) -> IO (Branch a)
 worker (Scope flaw operator branches) name act = do
   state <- getMaskingState
   mask_ $ do
-    asked <- newIORef False
+    requested <- newIORef False
     box <- newEmptyTMVarIO
     let label = Label operator (if flaw == Just DoesNotLabel then "" else name)
-        run = act (readIORef asked)
+        run = act (readIORef requested)
         put = atomically . putTMVar box
     (thread, end') <- case flaw of
       Just PublishesByAHandler -> do
@@ -142,7 +142,7 @@ worker (Scope flaw operator branches) name act = do
       _ -> do
         thread <- start label (if flaw == Just InheritsMasking then inState state run else run)
         pure (threadId thread, threadEnd thread)
-    let new = Branch thread asked (ending thread <$> end')
+    let new = Branch thread requested (ending thread <$> end')
     modifyIORef' branches (SomeBranch new :)
     pure new
  where
@@ -154,37 +154,38 @@ worker (Scope flaw operator branches) name act = do
 ending :: ThreadId -> Either SomeException a -> Outcome a
 ending self = \case
   Left e
-    | own e -> Stopped e
-    | Just (StoppedWithFault cause fault) <- fromException e, own cause -> Faulted fault
+    | isOwn e -> Stopped e
+    | Just (StoppedWithFault cause fault) <- fromException e, isOwn cause -> Faulted fault
     | not (isFailure e) -> Faulted e
   other -> Done other
  where
-  own e = fromException e == Just (Stop self)
+  isOwn e = fromException e == Just (Stop self)
 
--- | Asks all at once those that were not asked and have not ended.
-ask :: [SomeBranch] -> IO ()
-ask branches = mask_ (filterM unasked branches >>= go)
+-- | Requests the stop of all branches at once, except those with an earlier request and those
+-- that have ended.
+requestStop :: [SomeBranch] -> IO ()
+requestStop branches = mask_ (filterM claimStopRequest branches >>= go)
  where
   go [] = pure ()
   go [SomeBranch (Branch thread _ _)] = uninterruptibleMask_ (interrupt thread (Stop thread))
-  go (b : bs) = askByMessenger b >> go bs
+  go (b : bs) = requestStopByHelper b >> go bs
 
-askWithoutWaiting :: [SomeBranch] -> IO ()
-askWithoutWaiting branches = mask_ (filterM unasked branches >>= traverse_ askByMessenger)
+requestStopAsync :: [SomeBranch] -> IO ()
+requestStopAsync branches = mask_ (filterM claimStopRequest branches >>= traverse_ requestStopByHelper)
 
-unasked :: SomeBranch -> IO Bool
-unasked (SomeBranch (Branch _ asked outcome)) = do
+claimStopRequest :: SomeBranch -> IO Bool
+claimStopRequest (SomeBranch (Branch _ requested outcome)) = do
   over <- atomically ((True <$ outcome) `orElse` pure False)
-  if over then pure False else not <$> atomicModifyIORef' asked (\was -> (True, was))
+  if over then pure False else not <$> atomicModifyIORef' requested (\was -> (True, was))
 
-askByMessenger :: SomeBranch -> IO ()
-askByMessenger (SomeBranch (Branch thread _ _)) = throwToAll Stop [thread]
+requestStopByHelper :: SomeBranch -> IO ()
+requestStopByHelper (SomeBranch (Branch thread _ _)) = throwToAll Stop [thread]
 
 outcomeOf :: Branch a -> STM (Outcome a)
 outcomeOf (Branch _ _ outcome) = outcome
 
-settle :: Outcome a -> IO a
-settle = \case
+outcomeToIO :: Outcome a -> IO a
+outcomeToIO = \case
   Done r -> either throwIO pure r
   Faulted e -> throwIO e
   Stopped e -> throwIO e

@@ -2,9 +2,9 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- The operators once more, as plain as can be, with the places where one goes wrong.
--- Without a flaw they keep all promises: so it is for its flaw that a broken one is
--- rejected, and not for being a copy.
+-- A plain copy of the operators, with optional flaws. Without a flaw the copy keeps all
+-- promises, so a broken operator is rejected because of its flaw, and not because it is a
+-- copy.
 module Promises.Copy
   ( Flaw (..)
   , copied
@@ -39,23 +39,23 @@ copied flaw =
     , allOf = gather flaw "allOf" . zip numbers
     , beside = besideWith flaw
     , rSelect = \condition left right ->
-        react flaw "rSelect" (believed condition) (\c -> if c then Run "left" left else Run "right" right)
+        react flaw "rSelect" (possiblyFlawed condition) (\c -> if c then Run "left" left else Run "right" right)
     , monitor = \condition recovery task ->
-        react flaw "monitor" (believed condition) (\c -> if c then RunToEnd "recovery" recovery else Run "task" task)
+        react flaw "monitor" (possiblyFlawed condition) (\c -> if c then RunToEnd "recovery" recovery else Run "task" task)
     , whileHolding = \condition act ->
-        react flaw "whileHolding" (believed condition) $ \c ->
+        react flaw "whileHolding" (possiblyFlawed condition) $ \c ->
           if c then Run "branch" act else Conclude (failWith "the condition does not hold")
     , timeout = timeoutWith flaw
     , polling = pollingWith flaw
     }
  where
   numbers = map show [1 :: Int ..]
-  believed (Signal opening)
+  possiblyFlawed (Signal opening)
     | flaw == Just TakesDeadForFalse =
         Signal (fmap (\source -> source {view = mapView (`catchSTM` \(_ :: SomeException) -> pure False) <$> view source}) . opening)
     | otherwise = Signal opening
 
--- * Side by side
+-- * Concurrent
 
 fallbackWith :: Maybe Flaw -> Behavior a -> Behavior a -> Behavior a
 fallbackWith flaw first second = case flaw of
@@ -71,7 +71,7 @@ failingWith flaw act =
 race :: Maybe Flaw -> String -> [(String, Behavior a)] -> Behavior a
 race flaw operator behaviors = structured flaw operator $ \scope -> do
   branches <- traverse (uncurry (branch scope)) behaviors
-  settle <$> atomically (asum (map outcomeOf ((if flaw == Just RightWinsTies then reverse else id) branches)))
+  outcomeToIO <$> atomically (asum (map outcomeOf ((if flaw == Just RightWinsTies then reverse else id) branches)))
 
 besideWith :: Maybe Flaw -> [Behavior ()] -> Behavior a -> Behavior a
 besideWith flaw others body = structured flaw "scoped" $ \scope -> do
@@ -79,8 +79,8 @@ besideWith flaw others body = structured flaw "scoped" $ \scope -> do
   forked <- traverse (branch scope "fork") others
   let wrong b = outcomeOf b >>= \case
         Done (Right ()) -> retry
-        other -> pure (settle other >> throwIO (ErrorCall "unreachable"))
-  atomically ((settle <$> outcomeOf main) `orElse` asum (map wrong forked))
+        other -> pure (outcomeToIO other >> throwIO (ErrorCall "unreachable"))
+  atomically ((outcomeToIO <$> outcomeOf main) `orElse` asum (map wrong forked))
 
 gather :: Maybe Flaw -> String -> [(String, Behavior a)] -> Behavior [a]
 gather flaw operator behaviors = structured flaw operator $ \scope -> do
@@ -89,11 +89,11 @@ gather flaw operator behaviors = structured flaw operator $ \scope -> do
       firstWrong = asum (map (ended >=> either pure (const retry)) branches)
       allRight = traverse (ended >=> either (const retry) pure) branches
   if flaw == Just WaitsFromLeftToRight
-    then pure <$> traverse (\b -> atomically (outcomeOf b) >>= settle) branches
-    else atomically ((settleWrong <$> firstWrong) `orElse` (pure <$> allRight))
+    then pure <$> traverse (\b -> atomically (outcomeOf b) >>= outcomeToIO) branches
+    else atomically ((wrongToIO <$> firstWrong) `orElse` (pure <$> allRight))
  where
-  settleWrong :: Outcome a -> IO b
-  settleWrong wrong = settle wrong >> throwIO (ErrorCall "unreachable")
+  wrongToIO :: Outcome a -> IO b
+  wrongToIO wrong = outcomeToIO wrong >> throwIO (ErrorCall "unreachable")
 
 -- * Reactive
 
@@ -108,20 +108,20 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         choose sensors seen how
 
       choose :: [Branch ()] -> View k -> ReadMode -> IO (IO a)
-      choose sensors seen how = observe (readView how seen) >>= either (pure . throwIO) (obey sensors seen)
+      choose sensors seen how = tryAtomically (readView how seen) >>= either (pure . throwIO) (applyReaction sensors seen)
 
-      obey sensors seen old = case reaction old of
+      applyReaction sensors seen old = case reaction old of
         Conclude verdict -> pure verdict
-        RunToEnd name recovery -> ask (map SomeBranch sensors) >> recover sensors seen name recovery Nothing
+        RunToEnd name recovery -> requestStop (map SomeBranch sensors) >> recover sensors seen name recovery Nothing
         Run name act -> do
           running <- branch scope name act
-          event <- observe ((Right <$> outcomeOf running) `orElse` (Left <$> (reread seen >>= \new -> check (new /= old) >> pure new)))
+          event <- tryAtomically ((Right <$> outcomeOf running) `orElse` (Left <$> (reread seen >>= \new -> check (new /= old) >> pure new)))
           case event of
-            Right (Right outcome) -> pure (settle outcome)
-            Right (Left new) -> turn sensors seen new running (reaction new)
-            Left dead -> turn sensors seen old running (Conclude (throwIO dead))
+            Right (Right outcome) -> pure (outcomeToIO outcome)
+            Right (Left new) -> stopAndNext sensors seen new running (reaction new)
+            Left dead -> stopAndNext sensors seen old running (Conclude (throwIO dead))
 
-      turn sensors seen new running what = do
+      stopAndNext sensors seen new running what = do
         let others = case what of
               Run _ _ -> []
               _ -> map SomeBranch sensors
@@ -131,48 +131,48 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
       stop :: [SomeBranch] -> Branch b -> IO (Outcome b)
       stop others running
         | flaw == Just StartsBeforeTheEnd =
-            Stopped (toException ThreadKilled) <$ askWithoutWaiting (others ++ [SomeBranch running])
-        | otherwise = ask (others ++ [SomeBranch running]) >> atomically (outcomeOf running)
+            Stopped (toException ThreadKilled) <$ requestStopAsync (others ++ [SomeBranch running])
+        | otherwise = requestStop (others ++ [SomeBranch running]) >> atomically (outcomeOf running)
 
       next sensors seen new what outcome = case (what, outcome) of
         (_, Done (Right _)) | flaw == Just RunsTheCompletedAgain -> again
         (Conclude verdict, Done (Right _)) | flaw == Just DropsWhatCompletedInTime -> pure verdict
         (_, Done (Right a)) -> pure (pure a)
         (RunToEnd name recovery, Stopped _)
-          | flaw == Just ReadsAgainBeforeTheRecovery -> rested sensors >> begin Reread
+          | flaw == Just ReadsAgainBeforeTheRecovery -> awaitStopped sensors >> begin Reread
           | otherwise -> recover sensors seen name recovery Nothing
         (RunToEnd name recovery, wrong)
-          | flaw /= Just ThrowsBeforeTheRecovery -> recover sensors seen name recovery (Just (settle wrong))
+          | flaw /= Just ThrowsBeforeTheRecovery -> recover sensors seen name recovery (Just (outcomeToIO wrong))
         (Conclude verdict, Stopped _) -> pure verdict
         (Run _ _, Stopped _) -> again
-        (_, wrong) -> pure (settle wrong)
+        (_, wrong) -> pure (outcomeToIO wrong)
        where
         again = case what of
           Run _ _
-            | flaw == Just DoesNotReadAgain -> obey sensors seen new
+            | flaw == Just DoesNotReadAgain -> applyReaction sensors seen new
             | otherwise -> atomically (view source) >>= \fresh -> choose sensors fresh Reread
-          _ -> rested sensors >> begin Reread
+          _ -> awaitStopped sensors >> begin Reread
 
-      recover sensors seen name recovery aftermath = do
+      recover sensors seen name recovery taskVerdict = do
         recovered <- branch scope name recovery
         outcome <-
           if flaw == Just WatchesDuringTheRecovery
-            then observe ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ (reread seen >>= \now' -> check (unwanted now'))))
+            then tryAtomically ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ (reread seen >>= \now' -> check (unwanted now'))))
             else Right . Just <$> atomically (outcomeOf recovered)
-        case (outcome, aftermath) of
-          (Right (Just (Done (Right ()))), Nothing) -> rested sensors >> begin Reread
-          (Right (Just wrong), Nothing) -> pure (settle wrong >> throwIO (ErrorCall "unreachable"))
+        case (outcome, taskVerdict) of
+          (Right (Just (Done (Right ()))), Nothing) -> awaitStopped sensors >> begin Reread
+          (Right (Just wrong), Nothing) -> pure (outcomeToIO wrong >> throwIO (ErrorCall "unreachable"))
           (_, Just verdict) -> pure verdict
-          (_, Nothing) -> stop [] recovered >> rested sensors >> begin Reread
+          (_, Nothing) -> stop [] recovered >> awaitStopped sensors >> begin Reread
 
       unwanted value = case reaction value of
         RunToEnd _ _ -> False
         _ -> True
   begin FirstRead
  where
-  observe :: STM b -> IO (Either SomeException b)
-  observe act = atomically ((Right <$> act) `catchSTM` (pure . Left))
-  rested = traverse_ (atomically . outcomeOf)
+  tryAtomically :: STM b -> IO (Either SomeException b)
+  tryAtomically act = atomically ((Right <$> act) `catchSTM` (pure . Left))
+  awaitStopped = traverse_ (atomically . outcomeOf)
 
 timeoutWith :: Maybe Flaw -> Seconds -> Behavior a -> Behavior a
 timeoutWith flaw seconds act
@@ -182,7 +182,7 @@ timeoutWith flaw seconds act
       structured flaw "timeout" $ \scope -> do
         running <- branch scope "branch" act
         _ <- branch scope "clock" (sleep seconds >> throwToAll Stop [me])
-        (settle <$> atomically (outcomeOf running)) `catch` \e ->
+        (outcomeToIO <$> atomically (outcomeOf running)) `catch` \e ->
           if isCancellation e then pure (throwIO (TimedOut seconds)) else throwIO e
   | otherwise = do
       over <- newTVarIO False
@@ -197,7 +197,7 @@ pollingWith flaw every act = Signal $ \_ -> do
   nextSlot <- newTVarIO Nothing
   started <- newTVarIO (0 :: Int)
   newest <- newTVarIO Nothing
-  let readings asked = forever $ do
+  let readings stopRequested = forever $ do
         atomically (readTVar nextSlot) >>= traverse_ sleepUntil
         begun <- now
         k <- atomically $ do
@@ -205,13 +205,13 @@ pollingWith flaw every act = Signal $ \_ -> do
           writeTVar nextSlot (Just (begun + every))
           readTVar started
         read' <- trySynchronous act
-        stopping <- asked
+        stopping <- stopRequested
         if stopping
           then either throwIO (const (throwIO ThreadKilled)) read'
           else atomically (writeTVar newest (Just (k, read')))
       prepareReadings = do
         unless (flaw /= Just ForgetsThePeriod) (writeTVar nextSlot Nothing)
-        pure (\asked -> readings asked `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
+        pure (\stopRequested -> readings stopRequested `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
       seen = do
         before <- readTVar started
         pure . constantView $

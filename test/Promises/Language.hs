@@ -1,8 +1,8 @@
 {-# LANGUAGE RankNTypes #-}
 
 -- |
--- The operators, as something that can be exchanged: a promise is a property of a
--- 'Language', so that the library's own must keep it and a broken one must not.
+-- The operators as a record: a promise is a property of a 'Language'. The library's own
+-- language must keep it, and a broken one must not.
 module Promises.Language
   ( Language (..)
   , sound
@@ -31,7 +31,7 @@ data Language = Language
   , firstOf :: forall a. [Behavior a] -> Behavior a
   , allOf :: forall a. [Behavior a] -> Behavior [a]
   , beside :: forall a. [Behavior ()] -> Behavior a -> Behavior a
-  -- ^ Forks the ones, then does the other, in a scope.
+  -- ^ Forks the behaviours of the list in a scope, then runs the other as its body.
   , rSelect :: forall a. Signal Bool -> Behavior a -> Behavior a -> Behavior a
   , monitor :: forall a. Signal Bool -> Behavior () -> Behavior a -> Behavior a
   , whileHolding :: forall a. Signal Bool -> Behavior a -> Behavior a

@@ -1,6 +1,6 @@
 -- |
--- The promises that every operator keeps: tried under many schedules, in reality, and
--- on broken operators, which must not keep them.
+-- The promises that every operator keeps, tested under many schedules, in reality, and
+-- with broken operators, which must break them.
 module Promises.PromisesSimSpec
   ( spec
   , specWith
@@ -18,19 +18,19 @@ import Promises.Properties
 import Promises.Stage
 import Promises.Trying
 
--- | How much is tried.
+-- | The amount of testing.
 data Effort = Effort
   { randomSchedules :: Int
-  -- ^ Of each promise.
+  -- ^ For each promise.
   , smallPrograms :: Int
-  -- ^ Of each promise, under all their schedules with up to two pre-emptions.
+  -- ^ For each promise, under all their schedules with up to two pre-emptions.
   , realPrograms :: Int
-  -- ^ Of each promise.
+  -- ^ For each promise.
   , seeds :: Int
   -- ^ For each broken operator.
   }
 
--- | What is tried every time.
+-- | The amount for each run of the test suite.
 spec :: Spec
 spec = specWith (Effort 2000 20 50 5)
 
@@ -54,13 +54,13 @@ specWith effort = do
       it (promised promise) $
         counting (randomSchedules effort) (underRandom 1 (randomSchedules effort) copy promise)
   means <- runIO (newIORef [])
-  let table = "    after so many schedules, on average:"
-  afterAll_ (readIORef means >>= mapM_ putStrLn . (table :) . reverse) . describe "It is noticed when" $
+  let table = "    schedules until the rejection, on average:"
+  afterAll_ (readIORef means >>= mapM_ putStrLn . (table :) . reverse) . describe "A broken operator is rejected:" $
     forM_ mutants $ \mutant ->
       it (what mutant) $ do
         found <- traverse (\seed -> firstRejection 20000 seed (spoken mutant) (breaks mutant)) [1 .. seeds effort]
         when (Nothing `elem` found) $
-          expectationFailure ("20,000 schedules did not tell: " ++ promised (breaks mutant))
+          expectationFailure ("20,000 schedules did not break: " ++ promised (breaks mutant))
         let total = sum (catMaybes found)
         modifyIORef' means ((padded (show (total `div` seeds effort)) ++ "  " ++ what mutant) :)
  where

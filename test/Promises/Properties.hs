@@ -3,13 +3,13 @@
 module Promises.Properties
   ( promises
 
-    -- * One by one
+    -- * Each promise
   , structure
   , neverBoth
   , noLostWork
   , noLostFault
   , unmasked
-  , heard
+  , ownLevel
   , together
   , labelled
   , deadSensors
@@ -34,7 +34,7 @@ promises =
   , noLostWork
   , noLostFault
   , unmasked
-  , heard
+  , ownLevel
   , together
   , labelled
   , deadSensors
@@ -45,20 +45,20 @@ promises =
   , readAfresh
   ]
 
-structure, neverBoth, noLostWork, noLostFault, unmasked, heard, together :: Promise
-structure = Promise "Structured: what an operator started has ended before it does" (programsOf AnyRoot) (obeys Structure)
-neverBoth = Promise "Never both: a branch starts after the one before has ended" (programsOf ReactiveRoot) (obeys Exclusion)
-noLostWork = Promise "No lost work: what completed stands, and is not run again" (programsOf ReactiveRoot) (obeys Work)
-noLostFault = Promise "No lost fault: the leftmost fault gets out" (programsOf AnyRoot) (obeys FaultOut)
-unmasked = Promise "Interruptible: branches run unmasked, the second of ? as its caller does" (programsOf AnyRoot) (obeys Masking)
-heard = Promise "Interruptible: a stop is heard by whom it is meant for" levels stoppedAtItsLevel
-together = Promise "Together: all are asked to stop before one is waited for" companies askedTogether
+structure, neverBoth, noLostWork, noLostFault, unmasked, ownLevel, together :: Promise
+structure = Promise "Structured: what an operator started has ended before it does" 177509 (programsOf AnyRoot) (satisfies Structure)
+neverBoth = Promise "Never both: a branch starts after the one before has ended" 158272 (programsOf ReactiveRoot) (satisfies Exclusion)
+noLostWork = Promise "No lost work: the result of a completed branch is kept, and the branch does not run again" 152695 (programsOf ReactiveRoot) (satisfies Work)
+noLostFault = Promise "No lost fault: the leftmost fault is thrown" 87191 (programsOf AnyRoot) (satisfies FaultOut)
+unmasked = Promise "Interruptible: branches run unmasked, and the second of ? in its caller's masking state" 238881 (programsOf AnyRoot) (satisfies Masking)
+ownLevel = Promise "Interruptible: a stop request stops only what it is meant for" 135673 levels stoppedAtItsOwnLevel
+together = Promise "Together: all stop requests are made before the operator waits for a branch" 147822 groups stoppedTogether
 
 labelled, deadSensors, nothingSpins, causes, firstThenLeft, latchedRecovery, readAfresh :: Promise
-labelled = Promise "Labelled: every thread by its operator and branch" (programsOf AnyRoot) (obeys Labels)
-deadSensors = Promise "A dead sensor is never false" deaths notTakenForFalse
-nothingSpins = Promise "Nothing spins: readings start a period apart" scripts aPeriodApart
-causes = Promise "The order of outcomes: each outcome has its cause" (programsOf AnyRoot) (obeys Outcomes)
-firstThenLeft = Promise "The order of outcomes: the first to finish, and of those that tie the left one" relays leftWins
-latchedRecovery = Promise "A recovery is latched, and ends" missions latched
-readAfresh = Promise "A condition is read again after a stop" turns readAgain
+labelled = Promise "Labelled: every thread has its operator's and its branch's name" 116238 (programsOf AnyRoot) (satisfies Labels)
+deadSensors = Promise "A dead sensor is never false" 38795 sensorFailures notTakenForFalse
+nothingSpins = Promise "Nothing spins: readings start at least a period apart" 94583 scripts aPeriodApart
+causes = Promise "The order of outcomes: each outcome has a cause in the branches" 115431 (programsOf AnyRoot) (satisfies Outcomes)
+firstThenLeft = Promise "The order of outcomes: the first branch to finish decides, on a tie the left one" 281018 relays leftWins
+latchedRecovery = Promise "A recovery runs to its end, even if the condition becomes false" 45312 missions latched
+readAfresh = Promise "A condition is read again after a stop" 68530 toggles readAgain

@@ -1,22 +1,22 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Promises of what reacts to conditions.
+-- Promises about reactive operators.
 module Promises.Reactive
   ( -- * Dead sensors
-    deaths
+    sensorFailures
   , notTakenForFalse
 
     -- * Nothing spins
   , scripts
   , aPeriodApart
 
-    -- * Latched
+    -- * Latched recoveries
   , missions
   , latched
 
-    -- * Read again
-  , turns
+    -- * Rereading
+  , toggles
   , readAgain
   ) where
 
@@ -36,41 +36,41 @@ import qualified Promises.Language as L
 import Promises.Stage
 import Support (Ending (..), Fault (..), hang)
 
--- | What waits for something: a transaction that can be waited for.
+-- | Waits until the variable has a wanted value.
 until' :: TVar a -> (a -> Bool) -> Behavior ()
 until' var wanted = atomically (readTVar var >>= STM.check . wanted)
 
 -- * Dead sensors
 
--- | A sensor dies while the operator runs, or before it had a first value.
-data Death = Death Operator Sensor Cause Bool Act
+-- | A sensor that dies while the operator runs, or before its first value.
+data SensorFailure = SensorFailure Operator Sensor Cause Bool Act
   deriving (Show)
 
 data Operator = Selecting Bool | Monitoring | Holding
   deriving (Eq, Show)
 
-data Sensor = Event | Poll Int
+data Sensor = WatchedSensor | PolledSensor Int
   deriving (Eq, Show)
 
-data Cause = Failing | Faulting | Losing
+data Cause = Failing | Faulting | LosingValue
   deriving (Eq, Show)
 
-deaths :: Size -> Gen Death
-deaths size = do
-  sensor <- if size == Tiny then pure Event else frequency [(1, pure Event), (2, Poll <$> choose (1, 2))]
+sensorFailures :: Size -> Gen SensorFailure
+sensorFailures size = do
+  sensor <- if size == Tiny then pure WatchedSensor else frequency [(1, pure WatchedSensor), (2, PolledSensor <$> choose (1, 2))]
   fromTheStart <- frequency [(4, pure False), (1, pure True)]
-  cause <- elements ([Failing, Faulting] ++ [Losing | sensor == Event, not fromTheStart])
+  cause <- elements ([Failing, Faulting] ++ [LosingValue | sensor == WatchedSensor, not fromTheStart])
   operator <- elements [Selecting False, Selecting True, Monitoring, Holding]
   act <- acts 7
-  pure (Death operator sensor cause fromTheStart act)
+  pure (SensorFailure operator sensor cause fromTheStart act)
 
--- | The branch is stopped, no other starts, and the operator throws what the sensor did,
--- unless the branch has something to say itself.
-notTakenForFalse :: Stage -> Language -> Death -> IO ()
-notTakenForFalse stage l (Death operator sensor cause fromTheStart act) = do
+-- | The branch is stopped, no other branch starts, and the operator throws what the sensor
+-- threw, unless the branch ends otherwise than by stopping.
+notTakenForFalse :: Stage -> Language -> SensorFailure -> IO ()
+notTakenForFalse stage l (SensorFailure operator sensor cause fromTheStart act) = do
   dead <- newTVarIO fromTheStart
   inside <- newTVarIO False
-  others <- newJournal
+  others <- newLog
   let value = operator `elem` [Selecting True, Holding]
       reading :: STM Bool
       reading =
@@ -79,24 +79,24 @@ notTakenForFalse stage l (Death operator sensor cause fromTheStart act) = do
           True -> case cause of
             Failing -> failWith "the sensor"
             Faulting -> throwSTM (Fault "the sensor")
-            Losing -> retry
+            LosingValue -> retry
       signal = case sensor of
-        Event -> watching reading
-        Poll n -> L.polling l (fromIntegral n * tick stage) (atomically reading)
-      branch = perform stage (atomically (writeTVar inside True)) (pure ()) act {takes = untilStopped, deaf = False}
-      other = 0 <$ enter others ()
+        WatchedSensor -> watching reading
+        PolledSensor n -> L.polling l (fromIntegral n * tick stage) (atomically reading)
+      branch = perform stage (atomically (writeTVar inside True)) (pure ()) act {takes = untilStopped, uninterruptible = False}
+      other = 0 <$ append others ()
       operating = case operator of
         Selecting True -> L.rSelect l signal branch other
         Selecting False -> L.rSelect l signal other branch
-        Monitoring -> L.monitor l signal (enter others ()) branch
+        Monitoring -> L.monitor l signal (append others ()) branch
         Holding -> L.whileHolding l signal branch
-      deeds = [(0, Changes ()) | not fromTheStart]
-  end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar dead True)) deeds operating)
-  started <- journal others
+      stimuli = [(0, Changes ()) | not fromTheStart]
+  end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar dead True)) stimuli operating)
+  started <- readLog others
   unless (null started) $ broken "the other branch started"
   let expected
         | fromTheStart = sensors
-        | otherwise = case aftermath act of
+        | otherwise = case stopResponse act of
             Stops -> sensors
             Completes -> Gave (negate (number act))
             FailsToStop -> FailedWith ("Failure " ++ show (show (number act)))
@@ -104,16 +104,16 @@ notTakenForFalse stage l (Death operator sensor cause fromTheStart act) = do
       sensors = case cause of
         Failing -> FailedWith "FailedBecause \"the sensor\""
         Faulting -> FaultedWith (show (Fault "the sensor"))
-        Losing -> FailedWith "FailedBecause \"the signal has no value any more\""
-      -- The sensor may have faulted once more while it was stopped too: then that counts.
-      again = [sensors | cause == Faulting, sensor /= Event]
+        LosingValue -> FailedWith "FailedBecause \"the signal has no value any more\""
+      -- The sensor may also have faulted once more while it was stopped: then that is thrown.
+      again = [sensors | cause == Faulting, sensor /= WatchedSensor]
   unless (end `elem` map Gave (expected : again)) $
     broken ("it ended: " ++ show end ++ ", and not: " ++ show expected)
 
 -- * Nothing spins
 
--- | What a polled condition says, reading by reading; then it says false for ever, and
--- the branches end.
+-- | The values of a polled condition's readings; after these, all are false, and the branches
+-- end.
 data Script = Script Operator Int [Bool]
   deriving (Show)
 
@@ -127,14 +127,14 @@ scripts size =
 -- | Readings start at least a period apart, rereads and those after a recovery included.
 aPeriodApart :: Stage -> Language -> Script -> IO ()
 aPeriodApart stage l (Script operator every values) = do
-  asked <- newTVarIO (0 :: Int)
-  begun <- newJournal
+  started <- newTVarIO (0 :: Int)
+  begun <- newLog
   let apart = fromIntegral every * tick stage
       reading = do
-        now >>= enter begun
-        k <- atomically (modifyTVar' asked (+ 1) >> readTVar asked)
+        now >>= append begun
+        k <- atomically (modifyTVar' started (+ 1) >> readTVar started)
         pure (and (take 1 (drop (k - 1) values)) && k <= length values)
-      branch = until' asked (> length values + 1)
+      branch = until' started (> length values + 1)
       signal = L.polling l apart reading
   end <- run stage $ do
     t <- now
@@ -144,7 +144,7 @@ aPeriodApart stage l (Script operator every values) = do
       Holding -> L.whileHolding l (not <$> signal) branch)
   case end of
     Gave (t, ended) -> do
-      moments <- journal begun
+      moments <- readLog begun
       for_ (zip [0 :: Int ..] moments) $ \(k, moment) ->
         -- A period is a sum of fractions, each rounded.
         when (moment - t < fromIntegral k * apart - 1e-9) $
@@ -155,18 +155,18 @@ aPeriodApart stage l (Script operator every values) = do
         _ -> broken ("it ended: " ++ show ended)
     _ -> broken ("it ended: " ++ show end)
 
--- * Latched
+-- * Latched recoveries
 
--- | A task that needs a recovery, once or more often. It may be needed at the start, or
--- comes to be while the task runs; then it is perhaps not needed any more when the task
--- has ended. And it may come to be needed and not, again and again, while it runs.
+-- | A task that needs one or more recoveries. The first may be needed at the start, or only
+-- while the task runs; then perhaps it is not needed any more when the task has ended. While
+-- a recovery runs, the need may change repeatedly.
 data Mission = Mission
   { atTheStart :: Bool
   , withdrawn :: Bool
   , task :: Act
   , rounds :: [(Int, [Bool])]
-  -- ^ What each recovery has the condition be, by and by; the last is true if another
-  -- one is to follow.
+  -- ^ For each recovery the values that it gives to the condition, and the ticks before each.
+  -- The last is true if another recovery is to follow.
   , ofRecovery :: End
   -- ^ How the last recovery ends.
   }
@@ -182,98 +182,98 @@ missions size = do
     <*> traverse (\k -> (,) <$> choose (0, 2) <*> ((++ [k < n]) <$> (choose (0, 2) >>= \m -> vectorOf m (elements [False, True])))) [1 .. n]
     <*> frequency [(4, pure Succeeds), (1, ends)]
 
-data Happening = TaskStarts | TaskIsAsked | RecoveryStarts | RecoveryEnds | RecoveryIsAsked
+data Milestone = TaskStarts | TaskStopRequested | RecoveryStarts | RecoveryEnds | RecoveryStopRequested
   deriving (Eq, Show)
 
--- | Once the task was asked to stop, the recovery runs, to its end; and again while the
--- condition holds when it is read afresh. If the task completed all the same, it does
--- not; if it failed or faulted, it does all the same, and then that is thrown.
+-- | After the stop request for the task, the recovery runs, to its end; and again as long as
+-- the condition holds when it is read again. If the task completes despite the request, the
+-- recovery does not run. If the task fails or faults, the recovery runs, and then the failure
+-- or fault is thrown.
 latched :: Stage -> Language -> Mission -> IO ()
 latched stage l mission = do
   needed <- newTVarIO (atTheStart mission)
   inside <- newTVarIO False
   runs <- newTVarIO (0 :: Int)
   roundsLeft <- newTVarIO (rounds mission)
-  happenings <- newJournal
-  let asked = atTheStart mission
+  milestones <- newLog
+  let neededAtStart = atTheStart mission
       working = do
-        enter happenings TaskStarts
+        append milestones TaskStarts
         k <- atomically (modifyTVar' runs (+ 1) >> readTVar runs)
-        if asked || k > 1 then pause stage 1 >> pure 0 else untilAsked
-      -- It is asked to stop for sure: somebody sets the condition, and it has no end.
-      untilAsked =
+        if neededAtStart || k > 1 then pause stage 1 >> pure 0 else untilStopRequested
+      -- It certainly receives a stop request: the condition becomes true, and it has no end.
+      untilStopRequested =
         (atomically (writeTVar inside True) >> hang) `catch` \e -> do
-          enter happenings TaskIsAsked
+          append milestones TaskStopRequested
           when (withdrawn mission) . atomically $ writeTVar needed False
           pause stage (cleanup (task mission))
-          case aftermath (task mission) of
+          case stopResponse (task mission) of
             Stops -> throwIO (e :: SomeException)
             Completes -> pure 5
             FailsToStop -> finish 5 Fails
             FaultsInCleanup -> finish 5 Faults
       recovering = do
-        enter happenings RecoveryStarts
+        append milestones RecoveryStarts
         (takesLong, changes, isLast) <- atomically $
           readTVar roundsLeft >>= \case
             [] -> pure (0, [False], True)
             (k, bs) : more -> (k, bs, null more) <$ writeTVar roundsLeft more
         for_ changes (\b -> pause stage takesLong >> atomically (writeTVar needed b))
-          `onException` enter happenings RecoveryIsAsked
-        enter happenings RecoveryEnds
+          `onException` append milestones RecoveryStopRequested
+        append milestones RecoveryEnds
         when isLast . void $ finish 9 (ofRecovery mission)
-      deeds = [(0, Changes ()) | not asked]
+      stimuli = [(0, Changes ()) | not neededAtStart]
       whole = L.monitor l (watching (readTVar needed)) recovering working
-  end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar needed True)) deeds whole)
-  happened <- journal happenings
+  end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar needed True)) stimuli whole)
+  reached <- readLog milestones
   let recovery = [RecoveryStarts, RecoveryEnds]
       allRecoveries = concatMap (const recovery) (rounds mission)
-      wrongTask = aftermath (task mission) `elem` [FailsToStop, FaultsInCleanup]
+      wrongTask = stopResponse (task mission) `elem` [FailsToStop, FaultsInCleanup]
       afterwards
         | ofRecovery mission == Succeeds = ([TaskStarts], Gave 0)
         | otherwise = ([], thrown 9 (ofRecovery mission))
       onceWrong = case rounds mission of
-        [_] | ofRecovery mission == Faults, aftermath (task mission) == FailsToStop -> thrown 9 Faults
-        _ -> thrown 5 (if aftermath (task mission) == FailsToStop then Fails else Faults)
+        [_] | ofRecovery mission == Faults, stopResponse (task mission) == FailsToStop -> thrown 9 Faults
+        _ -> thrown 5 (if stopResponse (task mission) == FailsToStop then Fails else Faults)
       inTheEnd before = let (after, how) = afterwards in (before ++ allRecoveries ++ after, how)
       expected
-        | asked = inTheEnd []
-        | aftermath (task mission) == Completes = ([TaskStarts, TaskIsAsked], Gave 5)
-        | wrongTask = ([TaskStarts, TaskIsAsked] ++ recovery, onceWrong)
-        | otherwise = inTheEnd [TaskStarts, TaskIsAsked]
-  unless ((happened, end) == (Gave <$> expected)) $
-    broken ("this happened: " ++ show happened ++ ", " ++ show end ++ "; and not: " ++ show expected)
+        | neededAtStart = inTheEnd []
+        | stopResponse (task mission) == Completes = ([TaskStarts, TaskStopRequested], Gave 5)
+        | wrongTask = ([TaskStarts, TaskStopRequested] ++ recovery, onceWrong)
+        | otherwise = inTheEnd [TaskStarts, TaskStopRequested]
+  unless ((reached, end) == (Gave <$> expected)) $
+    broken ("these steps: " ++ show reached ++ ", and the end " ++ show end ++ "; and not: " ++ show expected)
  where
   thrown :: Int -> End -> Ending Int
   thrown n = \case
     Fails -> FailedWith ("Failure " ++ show (show n))
     _ -> FaultedWith ("Fault " ++ show (show n))
 
--- * Read again
+-- * Rereading
 
--- | A condition that is changed when the first branch runs, and by each branch again
--- while it is stopping.
-data Turns = Turns Sensor Bool [(Int, Bool)]
+-- | A condition that changes while each branch runs, and once more while that branch stops.
+data Toggles = Toggles Sensor Bool [(Int, Bool)]
   deriving (Show)
 
-turns :: Size -> Gen Turns
-turns size =
-  Turns
-    <$> (if size == Tiny then pure Event else elements [Event, Poll 1, Poll 2])
+toggles :: Size -> Gen Toggles
+toggles size =
+  Toggles
+    <$> (if size == Tiny then pure WatchedSensor else elements [WatchedSensor, PolledSensor 1, PolledSensor 2])
     <*> elements [False, True]
     <*> (choose (1, if size == Tiny then 1 else 3) >>= \n -> vectorOf n ((,) <$> choose (0, 2) <*> elements [False, True]))
 
--- | What starts is what the condition says when the branch before has ended.
-readAgain :: Stage -> Language -> Turns -> IO ()
-readAgain stage l (Turns sensor first stops) = do
+-- | The next branch is chosen by the condition's value at the end of the branch before.
+readAgain :: Stage -> Language -> Toggles -> IO ()
+readAgain stage l (Toggles sensor first stops) = do
   condition <- newTVarIO first
   starts <- newTVarIO (0 :: Int)
   left <- newTVarIO stops
-  started <- newJournal
+  started <- newLog
   let signal = case sensor of
-        Event -> watching (readTVar condition)
-        Poll n -> L.polling l (fromIntegral n * tick stage) (atomically (readTVar condition))
+        WatchedSensor -> watching (readTVar condition)
+        PolledSensor n -> L.polling l (fromIntegral n * tick stage) (atomically (readTVar condition))
       branch name = do
-        enter started name
+        append started name
         again <- atomically (readTVar left)
         case again of
           [] -> pause stage 1
@@ -283,10 +283,10 @@ readAgain stage l (Turns sensor first stops) = do
               pause stage takesLong
               atomically (writeTVar condition new)
               throwIO (e :: SomeException)
-      turn k = until' starts (>= k) >> atomically (modifyTVar' condition not)
+      toggle k = until' starts (>= k) >> atomically (modifyTVar' condition not)
       whole = L.rSelect l signal (branch True) (branch False)
-  end <- run stage (calling stage turn [(0, Changes k) | k <- [1 .. length stops]] whole)
-  these <- journal started
+  end <- run stage (calling stage toggle [(0, Changes k) | k <- [1 .. length stops]] whole)
+  these <- readLog started
   let expected = first : map snd stops
   unless (end == Gave (Gave ()) && these == expected) $
     broken ("it ended: " ++ show end ++ ", and these started: " ++ show these ++ "; and not: " ++ show expected)

@@ -3,8 +3,8 @@
 {-# LANGUAGE RankNTypes #-}
 
 -- |
--- What promises are tried with: a stage to run a behaviour on, real or simulated, and
--- actions that do on it all that actions may do.
+-- The means to test a promise: a stage to run a behaviour on, real or simulated, and
+-- actions that can succeed, fail, fault and respond to stop requests in all ways.
 module Promises.Stage
   ( -- * Promises
     Promise (..)
@@ -18,25 +18,25 @@ module Promises.Stage
   , pause
   , untilStopped
   , calling
-  , Deed (..)
-  , stopsIt
+  , Stimulus (..)
+  , stopsCaller
   , Outside (..)
 
     -- * Actions
   , Act (..)
   , End (..)
-  , Aftermath (..)
+  , StopResponse (..)
   , perform
   , finish
   , acts
   , ends
-  , aftermaths
+  , stopResponses
 
-    -- * What is found out
-  , Journal
-  , newJournal
-  , enter
-  , journal
+    -- * Logs
+  , Log
+  , newLog
+  , append
+  , readLog
   ) where
 
 import Control.Concurrent (ThreadId)
@@ -61,10 +61,12 @@ import Behavior.Internal.Runtime
 import Promises.Language
 import Support (Cancel (..), Ending, Failure (..), Fault (..), endingOf)
 
--- | A promise of the library: programs to try it with, and whether it was kept in one
--- run of one of them. It does not know how the program is run.
+-- | A promise of the library: random programs, and a test whether one run of one of them
+-- kept the promise. It is independent of how the program is run.
 data Promise = forall program. Show program => Promise
   { promised :: String
+  , salt :: Int
+  -- ^ A number of its own, so that each promise is tried with other random programs.
   , programs :: Size -> Gen program
   , kept :: Stage -> Language -> program -> IO ()
   -- ^ Runs the program once, and throws 'Broken' if the promise was not kept.
@@ -77,7 +79,7 @@ data Size
   | Full
   deriving (Eq, Show)
 
--- | What throws when a promise is not kept, and how it was not.
+-- | Thrown when a promise is broken; the text says how.
 newtype Broken = Broken String
 
 instance Show Broken where
@@ -88,77 +90,76 @@ instance Exception Broken
 broken :: String -> IO a
 broken = throwIO . Broken
 
--- | The program of this number.
+-- | The program for this seed.
 programFrom :: Gen program -> Int -> program
 programFrom gen seed = unGen gen (mkQCGen seed) 10
 
 -- | Where a behaviour is run.
 data Stage = Stage
   { run :: forall a. Behavior a -> IO (Ending a)
-  -- ^ Runs it to its end. That it does not come to one breaks every promise.
+  -- ^ Runs it to its end. A behaviour that does not end breaks every promise.
   , tick :: Seconds
   -- ^ The unit of time of the programs.
   , untilOver :: ThreadId -> Behavior ()
-  -- ^ Waits until a thread that will do nothing more has ended, and everybody can see
-  -- how.
+  -- ^ Waits until a thread that is about to end has ended, and its result is published.
   }
 
--- | Takes so many ticks, and is a scheduling point at least.
+-- | Takes the given number of ticks; zero ticks are a scheduling point.
 pause :: Stage -> Int -> Behavior ()
 pause stage n
   | n <= 0 = checkpoint
   | otherwise = sleep (fromIntegral n * tick stage)
 
--- | So many ticks that it does not come to its end: three hours where a tick is the shortest.
+-- | A number of ticks that never elapses in a test: three hours with the shortest tick.
 untilStopped :: Int
 untilStopped = 1000000000
 
--- | What is done to a behaviour from outside.
-data Deed world
-  = -- | Its caller is cancelled.
-    CancelsIt
+-- | An action on a behaviour from outside.
+data Stimulus world
+  = -- | Cancels its caller by an exception of an asynchronous type.
+    CancelsCaller
   | -- | The same, by an exception of a synchronous type.
-    ThrowsAtIt
+    ThrowsAtCaller
   | Changes world
   deriving (Eq, Show)
 
--- | What is thrown at a caller, though it is of a synchronous type.
+-- | An exception of a synchronous type that is thrown to a caller.
 data Outside = Outside
   deriving (Show)
 
 instance Exception Outside
 
-stopsIt :: Deed world -> Bool
-stopsIt = \case
-  CancelsIt -> True
-  ThrowsAtIt -> True
+stopsCaller :: Stimulus world -> Bool
+stopsCaller = \case
+  CancelsCaller -> True
+  ThrowsAtCaller -> True
   Changes _ -> False
 
--- | Runs the behaviour while these deeds are done, each so many ticks after the one
--- before. With nothing to do the caller is the thread that is there already.
-calling :: Stage -> (world -> Behavior ()) -> [(Int, Deed world)] -> Behavior a -> Behavior (Ending a)
+-- | Runs the behaviour while the stimuli are applied, each the given number of ticks after
+-- the one before. Without stimuli, the behaviour runs in the current thread.
+calling :: Stage -> (world -> Behavior ()) -> [(Int, Stimulus world)] -> Behavior a -> Behavior (Ending a)
 calling _ _ [] act = endingOf <$> try act
-calling stage change deeds act = do
+calling stage change stimuli act = do
   caller <- mask_ (start (Label "caller" "") act)
-  for_ deeds $ \(after, deed) -> do
+  for_ stimuli $ \(after, stimulus) -> do
     pause stage after
-    case deed of
-      CancelsIt -> throwToAll (const (Cancel "the caller")) [threadId caller]
-      ThrowsAtIt -> throwToAll (const Outside) [threadId caller]
+    case stimulus of
+      CancelsCaller -> throwToAll (const (Cancel "the caller")) [threadId caller]
+      ThrowsAtCaller -> throwToAll (const Outside) [threadId caller]
       Changes world -> change world
   endingOf <$> atomically (threadEnd caller)
 
--- | Something that takes time.
+-- | An action that takes time.
 data Act = Act
   { number :: Int
-  -- ^ What it returns, and what its failures and faults say.
+  -- ^ Its result, which is also in the texts of its failures and faults.
   , takes :: Int
-  , deaf :: Bool
-  -- ^ Whether it cannot be interrupted meanwhile.
+  , uninterruptible :: Bool
+  -- ^ Whether it is masked uninterruptibly meanwhile.
   , ending :: End
   , cleanup :: Int
-  -- ^ How long its cleanup takes when it was asked to stop.
-  , aftermath :: Aftermath
+  -- ^ How many ticks its cleanup takes after a stop request.
+  , stopResponse :: StopResponse
   }
   deriving (Show)
 
@@ -166,25 +167,24 @@ data Act = Act
 data End = Succeeds | Fails | Faults
   deriving (Bounded, Enum, Eq, Show)
 
--- | How it ends when it was asked to stop.
-data Aftermath = Stops | Completes | FailsToStop | FaultsInCleanup
+-- | How it ends after a stop request.
+data StopResponse = Stops | Completes | FailsToStop | FaultsInCleanup
   deriving (Bounded, Enum, Eq, Show)
 
--- | Does it. Whoever completes although he was asked to stop returns the number with a
--- minus, by which his work is known. The first action is done when it has begun, and
--- hears whatever comes; the second when the cleanup was interrupted: nobody must be asked
--- to stop twice.
+-- | Runs the action. If it completes despite a stop request, it returns the negated number.
+-- The first argument runs at the start of the action, and can be interrupted; the second runs
+-- when the cleanup is interrupted, which only a second stop request does.
 perform :: Stage -> Behavior () -> Behavior () -> Act -> Behavior Int
-perform stage begun disturbed act = work `catch` asked
+perform stage begun cleanupInterrupted act = work `catch` stopping
  where
   work = do
     begun
-    (if deaf act then uninterruptibleMask_ else id) (pause stage (takes act))
+    (if uninterruptible act then uninterruptibleMask_ else id) (pause stage (takes act))
     finish (number act) (ending act)
-  asked e
+  stopping e
     | isCancellation e = do
-        pause stage (cleanup act) `onException` disturbed
-        case aftermath act of
+        pause stage (cleanup act) `onException` cleanupInterrupted
+        case stopResponse act of
           Stops -> throwIO e
           Completes -> pure (negate (number act))
           FailsToStop -> finish (number act) Fails
@@ -196,7 +196,7 @@ finish n Succeeds = pure n
 finish n Fails = throwIO (Failure (show n))
 finish n Faults = throwIO (Fault (show n))
 
--- | Short, so that ties are frequent.
+-- | Random actions, which are short, so that ties are frequent.
 acts :: Int -> Gen Act
 acts n =
   Act n
@@ -204,23 +204,23 @@ acts n =
     <*> frequency [(5, pure False), (1, pure True)]
     <*> frequency [(4, pure Succeeds), (2, pure Fails), (1, pure Faults)]
     <*> choose (0, 2)
-    <*> aftermaths
+    <*> stopResponses
 
 ends :: Gen End
 ends = elements [minBound .. maxBound]
 
-aftermaths :: Gen Aftermath
-aftermaths = frequency [(3, pure Stops), (1, pure Completes), (1, pure FailsToStop), (2, pure FaultsInCleanup)]
+stopResponses :: Gen StopResponse
+stopResponses = frequency [(3, pure Stops), (1, pure Completes), (1, pure FailsToStop), (2, pure FaultsInCleanup)]
 
--- | What happened, the latest first. To write into it is no scheduling point.
-newtype Journal e = Journal (IORef [e])
+-- | A log, the newest entry first. Appending to it is no scheduling point.
+newtype Log e = Log (IORef [e])
 
-newJournal :: IO (Journal e)
-newJournal = Journal <$> newIORef []
+newLog :: IO (Log e)
+newLog = Log <$> newIORef []
 
-enter :: Journal e -> e -> IO ()
-enter (Journal entries) e = atomicModifyIORef' entries (\es -> (e : es, ()))
+append :: Log e -> e -> IO ()
+append (Log entries) e = atomicModifyIORef' entries (\es -> (e : es, ()))
 
--- | From the beginning.
-journal :: Journal e -> IO [e]
-journal (Journal entries) = reverse <$> readIORef entries
+-- | The entries, the oldest first.
+readLog :: Log e -> IO [e]
+readLog (Log entries) = reverse <$> readIORef entries

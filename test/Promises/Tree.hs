@@ -1,11 +1,11 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Random behaviours in which every operator is nested in every other.
+-- Random behaviours, in which every operator can be nested in every other.
 module Promises.Tree
   ( Program (..)
   , Tree (..)
-  , Look (..)
+  , Sensing (..)
   , programsOf
   , Root (..)
   ) where
@@ -15,9 +15,9 @@ import Test.QuickCheck (Gen, choose, elements, frequency, oneof, shuffle, vector
 
 import Promises.Stage
 
--- | A behaviour; what is done to it from outside, and when (the world is a number, which
--- the conditions look at); and in which masking state it is called.
-data Program = Program Tree [(Int, Deed Int)] MaskingState
+-- | A behaviour; the stimuli, each with the ticks before it (the world is a number, which
+-- the conditions read); and the masking state of its caller.
+data Program = Program Tree [(Int, Stimulus Int)] MaskingState
   deriving (Show)
 
 data Tree
@@ -29,14 +29,14 @@ data Tree
   | FirstOf [Tree]
   | AllOf [Tree]
   | Beside [Tree] Tree
-  | Select Look Tree Tree
-  | Monitor Look Tree Tree
-  | WhileHolding Look Tree
+  | Select Sensing Tree Tree
+  | Monitor Sensing Tree Tree
+  | WhileHolding Sensing Tree
   | Timeout Int Tree
   deriving (Show)
 
--- | Whether a condition is watched, or polled so often.
-data Look = Watched | Polled Int
+-- | Whether a condition is watched, or polled with the given period in ticks.
+data Sensing = Watched | Polled Int
   deriving (Show)
 
 -- | Which operators may stand at the root.
@@ -45,20 +45,20 @@ data Root = AnyRoot | ReactiveRoot
 
 programsOf :: Root -> Size -> Gen Program
 programsOf root size = case size of
-  Full -> Program <$> (numbered <$> tree 2) <*> deeds <*> states
-  -- With a caller of its own there is room for one branch; without, for two.
+  Full -> Program <$> (numbered <$> tree 2) <*> stimuli <*> states
+  -- Up to three threads: with a caller's thread one branch can run, without one two can.
   Tiny ->
     oneof
-      [ Program <$> (numbered <$> tree' narrow 1) <*> deeds <*> states
+      [ Program <$> (numbered <$> tree' narrow 1) <*> stimuli <*> states
       , Program <$> (numbered <$> tree' wide 1) <*> pure [] <*> states
       ]
  where
   states = frequency [(4, pure Unmasked), (1, pure MaskedInterruptible), (1, pure MaskedUninterruptible)]
-  deeds = do
+  stimuli = do
     changes <- choose someChanges >>= \n -> vectorOf n (Changes <$> choose (0, 3))
-    cancels <- frequency [(1, pure 0), (3, pure 1), (2, pure 2)] >>= \n -> vectorOf n (frequency [(2, pure CancelsIt), (1, pure ThrowsAtIt)])
+    cancels <- frequency [(1, pure 0), (3, pure 1), (2, pure 2)] >>= \n -> vectorOf n (frequency [(2, pure CancelsCaller), (1, pure ThrowsAtCaller)])
     order <- shuffle (changes ++ cancels)
-    traverse (\deed -> (\after -> (after, deed)) <$> choose (0, 2)) order
+    traverse (\stimulus -> (\after -> (after, stimulus)) <$> choose (0, 2)) order
 
   someChanges = case size of
     Tiny -> (0, 1)
@@ -67,9 +67,9 @@ programsOf root size = case size of
   tree :: Int -> Gen Tree
   tree n = oneof (reactive n ++ (if root == ReactiveRoot then [] else concurrent n))
   tree' kinds n = oneof (kinds n)
-  -- Where something is to be lost, often something is there.
+  -- For the promise that no work is lost, the stop responses are equally frequent.
   leaf
-    | root == ReactiveRoot = (\act how -> Leaf act {aftermath = how}) <$> acts 0 <*> elements [minBound ..]
+    | root == ReactiveRoot = (\act how -> Leaf act {stopResponse = how}) <$> acts 0 <*> elements [minBound ..]
     | otherwise = Leaf <$> acts 0
   within' :: Int -> Gen Tree
   within' 0 = leaf
@@ -81,11 +81,11 @@ programsOf root size = case size of
       , (3, oneof (reactive n ++ concurrent n))
       ]
   less n = within' (n - 1)
-  looks = if size == Tiny then pure Watched else frequency [(3, pure Watched), (1, Polled <$> choose (1, 2))]
+  sensings = if size == Tiny then pure Watched else frequency [(3, pure Watched), (1, Polled <$> choose (1, 2))]
   reactive n =
-    [ Select <$> looks <*> less n <*> less n
-    , Monitor <$> looks <*> less n <*> less n
-    , WhileHolding <$> looks <*> less n
+    [ Select <$> sensings <*> less n <*> less n
+    , Monitor <$> sensings <*> less n <*> less n
+    , WhileHolding <$> sensings <*> less n
     ]
       ++ [Timeout <$> choose (0, 3) <*> less n | size == Full]
   concurrent n =

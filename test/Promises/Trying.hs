@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Ways to try a promise: under random schedules, under all, and in reality.
+-- Ways to test a promise: under random schedules, under all schedules, and in reality.
 module Promises.Trying
   ( Tried (..)
   , underRandom
@@ -24,7 +24,7 @@ import Promises.Stage
 import Support (Cancel (..), endingOf, within)
 import qualified Support
 
--- | How much was tried.
+-- | The amount of testing that was done.
 data Tried = Tried
   { programsTried :: !Int
   , schedulesExplored :: !Int
@@ -43,31 +43,33 @@ instance Show Tried where
       ++ show (pointsTried t)
       ++ " scheduling points"
 
--- | Under so many random schedules in all, of random programs, from this number on.
+-- | Tests the given number of random schedules in all, of random programs. The first argument
+-- is the number of the first program.
 underRandom :: Int -> Int -> Language -> Promise -> IO Tried
-underRandom from n language (Promise name gen keeping) =
+underRandom from n language (Promise _ itsSalt gen keeping) =
   mconcat <$> mapM one (take (n `div` perProgram) [from ..])
  where
   one i =
-    let program = programFrom (gen Full) (seedOf name i)
-     in tried (show program) (Random perProgram (seedOf name i)) (\stage -> keeping stage language program)
+    let program = programFrom (gen Full) (seedOf itsSalt i)
+     in tried (show program) (Random perProgram (seedOf itsSalt i)) (\stage -> keeping stage language program)
 
--- | The same number stands for another program with every promise.
-seedOf :: String -> Int -> Int
-seedOf name i = i + 1000003 * sum (zipWith (*) [1 ..] (map fromEnum name))
+-- | The seed of a promise's i-th program, which depends on the promise.
+seedOf :: Int -> Int -> Int
+seedOf itsSalt i = i + 1000003 * itsSalt
 
--- | So many schedules are tried of each random program.
+-- | How many schedules are tried of each random program.
 perProgram :: Int
 perProgram = 20
 
--- | Under all schedules with up to so many pre-emptions, of so many small programs (none
--- may have more than so many schedules), from this number on.
+-- | Tests all schedules of small programs. The arguments are the number of the first program,
+-- the greatest number of pre-emptions, the greatest number of schedules that a program may
+-- have, and how many programs are tested.
 underAll :: Int -> Int -> Int -> Int -> Language -> Promise -> IO Tried
-underAll from preemptions limit n language (Promise name gen keeping) =
+underAll from preemptions limit n language (Promise _ itsSalt gen keeping) =
   mconcat <$> mapM one (take n [from ..])
  where
   one i =
-    let program = programFrom (gen Tiny) (seedOf name i)
+    let program = programFrom (gen Tiny) (seedOf itsSalt i)
      in tried (show program) (Exhaustive preemptions limit) (\stage -> keeping stage language program)
 
 tried :: String -> Search -> (Stage -> IO ()) -> IO Tried
@@ -78,7 +80,7 @@ tried program how keeping =
       | complete report -> pure (Tried 1 (schedules report) (pointsInAll report))
       | otherwise -> broken ("there are more than " ++ show (schedules report) ++ " schedules of this program:\n" ++ program)
 
--- | No program comes near them.
+-- | Limits that no program comes near.
 limits :: Options
 limits = defaults {livelockLimit = 5000, endAt = 1000}
 
@@ -93,15 +95,15 @@ simulated simulating =
           Returned () -> readIORef end >>= maybe (broken "it did not end") (pure . endingOf)
           none -> broken (explain none)
     , tick = 1
-    , -- It is pending until the thread ends (and is raised only in one that unmasks before).
-      untilOver = \thread -> interrupt thread (Cancel "nobody")
+    , -- The exception is pending until the thread ends (or is raised there if it unmasks before).
+      untilOver = \thread -> interrupt thread (Cancel "untilOver")
     }
 
--- | So many random programs, in reality, from this number on.
+-- | Tests the given number of random programs in reality, from the one with this number on.
 inReality :: Int -> Int -> Language -> Promise -> IO ()
-inReality from n language (Promise name gen keeping) =
+inReality from n language (Promise _ itsSalt gen keeping) =
   forM_ (take n [from ..]) $ \i -> do
-    let program = programFrom (gen Full) (seedOf name i)
+    let program = programFrom (gen Full) (seedOf itsSalt i)
     within 20 (keeping real language program) `catch` \(Broken how) -> broken ("of this program:\n" ++ show program ++ "\n" ++ how)
 
 real :: Stage
@@ -117,10 +119,10 @@ real =
     status <- threadStatus thread
     unless (status `elem` [ThreadFinished, ThreadDied]) (yield >> over thread)
 
--- | The number of the random schedule that is the first under which the promise is not
--- kept, if that is one of so many; the programs and the schedules are those of a seed.
+-- | The number of the first random schedule under which the promise is broken, if it is within
+-- the limit. The programs and the schedules depend on the seed.
 firstRejection :: Int -> Int -> Language -> Promise -> IO (Maybe Int)
-firstRejection limit seed language (Promise _ gen keeping) = go 1
+firstRejection limit seed language (Promise _ _ gen keeping) = go 1
  where
   go i
     | i > limit = pure Nothing

@@ -2,9 +2,9 @@
 {-# LANGUAGE RankNTypes #-}
 
 -- |
--- A simulator that is wrong: an exception that a thread cannot receive where it is thrown is
--- not raised where that unmasks, but when its sender next has the turn and the thread is at an
--- operation. (This was the rule once.)
+-- A wrong simulator: an exception that finds its target masked is not raised where the target
+-- unmasks, but when its sender runs next and the target is at an operation. (An earlier
+-- version had this rule.)
 module Reality.Broken
   ( late
   ) where
@@ -19,22 +19,23 @@ import qualified Data.Set as Set
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Dispatch (simulator, withBackend)
 
--- | Runs a behaviour by the wrong rule, if it runs in a simulation.
+-- | Runs a behaviour by the wrong rule, if this is a simulation.
 late :: IO a -> IO a
 late act =
   simulator >>= \case
     Nothing -> act
-    Just s -> newTVarIO Set.empty >>= \shut -> withBackend (-1) (lately s shut) act
+    Just s -> newTVarIO Set.empty >>= \uninterruptible -> withBackend (-1) (lately s uninterruptible) act
 
--- | The threads in the set cannot be interrupted; each says so at its operations.
+-- | The set contains the threads that are masked uninterruptibly; each updates it at its
+-- operations.
 lately :: Simulator -> TVar (Set ThreadId) -> Simulator
-lately s shut =
+lately s uninterruptible =
   s
     { spawn = \label body publish ->
         after (spawn s label (\begin unmask -> body (after begin) unmask <* after (pure ())) publish)
     , deliver = throws
     , send = \target e -> do
-        waits <- Set.member target <$> readTVarIO shut
+        waits <- Set.member target <$> readTVarIO uninterruptible
         if waits
           then void (spawn s (Label "interrupt" "messenger") (\_ _ -> thatEnds (uninterruptibleMask_ (throws target e))) pure)
           else send s target e
@@ -47,18 +48,18 @@ lately s shut =
   throws :: ThreadId -> SomeException -> IO ()
   throws target e = do
     self <- myThreadId
-    waits <- Set.member target . Set.delete self <$> readTVarIO shut
-    when waits (transact s (readTVar shut >>= check . Set.notMember target))
+    waits <- Set.member target . Set.delete self <$> readTVarIO uninterruptible
+    when waits (transact s (readTVar uninterruptible >>= check . Set.notMember target))
     after (deliver s target e)
-  -- When the run has ended, what it waits for is thrown to it.
+  -- When the run has ended, an exception unwinds this thread.
   thatEnds :: IO () -> IO ()
   thatEnds act = act `catch` \(SomeException _) -> pure ()
   after :: IO a -> IO a
   after operation = do
     self <- myThreadId
     is <- (== MaskedUninterruptible) <$> getMaskingState
-    was <- Set.member self <$> readTVarIO shut
-    when (is && not was) (atomically (modifyTVar' shut (Set.insert self)))
-    -- Whoever waits for this is part of the simulation.
-    when (was && not is) (transact s (modifyTVar' shut (Set.delete self)))
+    was <- Set.member self <$> readTVarIO uninterruptible
+    when (is && not was) (atomically (modifyTVar' uninterruptible (Set.insert self)))
+    -- This can wake threads of the simulation, so it is a simulated transaction.
+    when (was && not is) (transact s (modifyTVar' uninterruptible (Set.delete self)))
     operation

@@ -1,11 +1,10 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What comes of random programs on real threads must be among what comes of them in the
--- simulation.
+-- The outcomes of random programs on real threads must be among their simulated outcomes.
 module Reality.Compare
   ( Compared (..)
-  , strange
+  , onlyInReality
   , compareMany
   , explored
   , inReality
@@ -30,14 +29,14 @@ import Reality.Program
 import Reality.Stage
 import Support (within)
 
--- | A program, and what came of it.
+-- | A program, and its outcomes.
 data Compared = Compared
   { compared :: Program
   , schedulesExplored :: Int
   , simulated :: Set String
-  -- ^ What comes of all schedules that there are.
+  -- ^ The outcomes of all schedules.
   , real :: Set String
-  -- ^ What came of real runs.
+  -- ^ The outcomes of real runs.
   }
 
 instance Show Compared where
@@ -49,11 +48,11 @@ instance Show Compared where
       ]
 
 -- | The real outcomes that no simulated run has.
-strange :: Compared -> Set String
-strange c = real c `Set.difference` simulated c
+onlyInReality :: Compared -> Set String
+onlyInReality c = real c `Set.difference` simulated c
 
 -- | Takes the given number of the seed's programs that have no more schedules than the limit,
--- and runs each the given number of times. The first function is done around what is simulated.
+-- and runs each the given number of times. The first function wraps each simulated behaviour.
 compareMany :: (IO String -> IO String) -> Int -> Int -> Int -> Int -> (Compared -> IO ()) -> IO ()
 compareMany rule seed limit many runs found = go many (zip [seed ..] (programs seed))
  where
@@ -69,8 +68,8 @@ compareMany rule seed limit many runs found = go many (zip [seed ..] (programs s
         found (Compared p tried outcomes outcomes')
         go (left - 1) others
 
--- | How many schedules the program has, and all that comes of them. Nothing if there are more
--- than the limit, or if under one of them it does not end.
+-- | How many schedules the program has, and all their outcomes. 'Nothing' if there are more
+-- schedules than the limit, or if the program does not end under one of them.
 explored :: (IO String -> IO String) -> Int -> Program -> IO (Maybe (Int, Set String))
 explored rule limit p
   | size p > 14 = pure Nothing
@@ -90,13 +89,13 @@ explored rule limit p
     outcomes <- readIORef seen
     pure (if complete report then (,) (schedules report) <$> outcomes else Nothing)
 
--- | What comes of the given number of real runs, whose timing varies from one to the next.
+-- | The outcomes of the given number of real runs, whose timing varies.
 inReality :: Int -> Int -> Program -> IO (Set String)
 inReality seed runs p = do
   state <- newIORef seed
   realOutcomes runs (observed (jitter state) p)
 
--- | Half of the time nothing; else it lets others run, or takes a few microseconds.
+-- | Half of the time does nothing; otherwise yields, or takes a few microseconds.
 jitter :: IORef Int -> IO ()
 jitter state = do
   n <- atomicModifyIORef' state (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', s' `div` 65536))
@@ -111,8 +110,8 @@ jitter state = do
   spin 0 = 0
   spin k = spin (k - 1)
 
--- | How many programs there were, how many of them have several simulated outcomes; how many
--- schedules and simulated outcomes there are in all, and how many of those came in reality.
+-- | The numbers of programs, of programs with several simulated outcomes, of schedules, of
+-- simulated outcomes, and of simulated outcomes that occurred in reality, too.
 data Figures = Figures Int Int Int Int Int
 
 instance Semigroup Figures where
@@ -124,7 +123,7 @@ instance Monoid Figures where
 instance Show Figures where
   show (Figures count several tried outcomes met) =
     show count ++ " programs, " ++ show several ++ " of them with several outcomes; " ++ show tried ++ " schedules, "
-      ++ show outcomes ++ " outcomes, " ++ show met ++ " of them met in reality"
+      ++ show outcomes ++ " outcomes, " ++ show met ++ " of them observed in reality"
 
 figures :: Compared -> Figures
 figures c =

@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Random programs, so small that all their schedules can be explored.
+-- Random programs that are small enough to explore all their schedules.
 module Reality.Generate
   ( programs
   ) where
@@ -17,7 +17,7 @@ import Reality.Program
 programs :: Int -> [Program]
 programs seed = [lettered (unGen (operator 1) (mkQCGen (seed * 1000003 + n)) 10) | n <- [0 ..]]
 
--- | An operator with threads of its own, around at most so many others.
+-- | An operator with threads of its own, which contains others up to the given depth.
 operator :: Int -> Gen Program
 operator n =
   frequency
@@ -41,7 +41,7 @@ operator n =
     | n > 0 = frequency [(9, work), (1, operator (n - 1))]
     | otherwise = work
   meanwhile = Parallel
-  -- A branch that ends its own condition.
+  -- A branch that makes its own condition false.
   closing =
     oneof
       [ Then (Close 0) <$> work
@@ -49,7 +49,7 @@ operator n =
       , Then <$> wrapping (pure (Close 0)) <*> step
       , wrapping (Then (Close 0) <$> step)
       ]
-  -- What changes the condition, and does not end before the other branch by itself.
+  -- Changes the condition; most of these then wait, so that the other branch ends first.
   changing = frequency [(3, pure (Open 0 `Then` Await 1)), (1, pure (Open 0 `Then` (Close 0 `Then` Await 1))), (1, step)]
 
 -- | What a branch does.
@@ -85,7 +85,7 @@ step =
     , (1, pure (Faults 'x'))
     ]
 
--- | Gives every part a letter of its own.
+-- | Gives every part its own letter.
 lettered :: Program -> Program
 lettered = snd . go ['a' ..]
  where

@@ -40,8 +40,7 @@ data Program
   | Both Program Program
   | FirstOf [Program]
   | AllOf [Program]
-  | -- | The first is forked; the second is the body, and the third what it does when the
-    -- first has ended.
+  | -- | The first is forked; the body runs the second, awaits the first, and runs the third.
     Forking Program Program Program
   | RSelect Int Program Program
   | Switch Int Program Program
@@ -49,7 +48,7 @@ data Program
   | WhileHolding Int Program
   deriving (Eq, Show)
 
--- | How many operations there are in it.
+-- | The approximate number of operations.
 size :: Program -> Int
 size = \case
   Then p q -> size p + size q
@@ -69,8 +68,8 @@ size = \case
   WhileHolding _ p -> 4 + size p
   _ -> 1
 
--- | Whether what it does last is an unmask (if it is not masked itself). In reality an
--- exception may come after that, but the same comes of one that was pending.
+-- | Whether its last operation is an unmask (if its caller is not masked). In reality an
+-- exception may arrive after that, but one that is raised by the unmask has the same outcome.
 unmasksLast :: Program -> Bool
 unmasksLast = \case
   Masked _ -> True
@@ -87,8 +86,8 @@ data World = World
   , logged :: TVar String
   }
 
--- | What a run of the program gives: the log, and how the program ended. The first action
--- is done at each place where the timing matters; it must have no effect.
+-- | The outcome of a run of the program: the log, and how the program ended. The first action
+-- runs at each place where the timing matters; it must have no effect.
 observed :: IO () -> Program -> IO String
 observed jitter program = do
   world <- World <$> replicateM 2 (newTVarIO False) <*> newTVarIO ""
@@ -96,9 +95,9 @@ observed jitter program = do
   line <- readTVarIO (logged world)
   pure (reverse line ++ ": " ++ show end)
 
--- | A simulated run has a scheduling point before each operation. So that no exception
--- comes in reality where none could come in a simulation, there is one more where the masking
--- state, or the handler that is in place, is about to change.
+-- | A simulated run has a scheduling point before each operation. There is one more before each
+-- change of the masking state or of the handlers, so that exceptions cannot arrive in reality
+-- where they cannot arrive in a simulation.
 run :: IO () -> World -> Program -> Behavior Char
 run jitter world = go
  where

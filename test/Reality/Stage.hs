@@ -1,11 +1,11 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Programs that run unchanged on real threads and in a simulation, and what comes of them.
+-- Programs that run unchanged on real threads and in a simulation, and their outcomes.
 --
 -- No program sleeps on real threads. Where one thread has to wait until another is blocked,
 -- the real run reads that thread's status, and the simulated one sleeps: virtual time
--- moves only when no thread can go on.
+-- passes only when no thread can continue.
 module Reality.Stage
   ( -- * Threads of a program
     Member (memberId)
@@ -54,8 +54,8 @@ thread name act = do
   untilBlocked new
   pure new
 
--- | A thread that throws this to the other one, and is blocked now unless that has
--- received it, or has ended.
+-- | Starts a thread that throws the exception to the target. When this returns, that thread
+-- is blocked, or the target has received the exception or has ended.
 throwsTo :: Member a -> String -> IO (Member ())
 throwsTo target name = thread ("thrower of " ++ name) (interrupt (memberId target) (Cancel name))
 
@@ -66,7 +66,7 @@ untilBlocked target = inSimulation really (const (sleep 1))
   really = do
     status <- threadStatus (memberId target)
     case status of
-      -- What it throws may be under way yet, to another capability.
+      -- Its exception may still be in flight to another capability.
       ThreadBlocked BlockedOnException -> replicateM_ 2 everyCapability
       _ -> unless (blocked status) (yield >> really)
 
@@ -79,9 +79,9 @@ everyCapability = do
   capabilities <- getNumCapabilities
   for_ [1 .. capabilities] $ \c -> forkOn c (pure ()) >>= awaitOver
 
--- | Returns once the thread, and those that do something for it, have done all that they
--- can. (A thread that was woken is blocked again each time that every capability has run
--- what was ready: it wakes others, which wake it.)
+-- | Returns once the thread and its helper threads are blocked. (A woken thread wakes others,
+-- which wake it again; so it must be blocked several times after each capability has run its
+-- ready threads.)
 untilQuiet :: Member a -> IO ()
 untilQuiet target = inSimulation (go (6 :: Int)) (const (sleep 1))
  where
@@ -91,25 +91,25 @@ untilQuiet target = inSimulation (go (6 :: Int)) (const (sleep 1))
     status <- threadStatus (memberId target)
     go (if blocked status then n - 1 else 6)
 
--- | Waits for the end of the thread, and says how it ended.
+-- | Waits for the end of the thread, and returns how it ended.
 endOf :: Show a => Member a -> IO String
 endOf target =
   atomically (memberEnd target) >>= \case
     Right a -> pure (show a)
     Left e -> pure (maybe ("threw " ++ show e) (\(Cancel name) -> "threw " ++ name) (fromException e))
 
--- | What comes of the given number of real runs.
+-- | The outcomes of the given number of real runs.
 realOutcomes :: Ord a => Int -> IO a -> IO (Set a)
 realOutcomes n program = go n Set.empty
  where
   go 0 seen = pure seen
   go k seen = program >>= \a -> let seen' = Set.insert a seen in seen' `seq` go (k - 1) seen'
 
--- | What comes of all schedules with up to so many pre-emptions.
+-- | The outcomes of all schedules with up to the given number of pre-emptions.
 simulatedOutcomes :: Int -> IO String -> IO (Set String)
 simulatedOutcomes = exploredBy . exhaustively
 
--- | What comes of the given number of random schedules.
+-- | The outcomes of the given number of random schedules.
 randomOutcomes :: Int -> IO String -> IO (Set String)
 randomOutcomes = exploredBy . randomly
 

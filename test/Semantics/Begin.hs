@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- How programs begin.
+-- The initial states of programs.
 module Semantics.Begin
   ( initial
   , begin
@@ -19,25 +19,25 @@ import Semantics.Program
 import Semantics.Source
 import Semantics.State
 
--- | The program and its environment, about to begin.
+-- | The initial state of a world.
 initial :: World -> State
 initial world =
   State
     { now = start
     , running = case caller world of
         Operator ->
-          Looking
+          Waiting
             Race
             [ thread start "firstOf: 1" (program world)
-            , Thread "firstOf: 2" (Living Unborn (Changing (changes world) (patience world)))
+            , Thread "firstOf: 2" (Live NotStarted (Changing (changes world) (cancelAt world)))
             ]
-        Stranger _ later ->
-          Called Unasked (Starting (program world)) (changes world) [patience world, patience world + later]
+        PlainThread _ later ->
+          Called NoRequest (Starting (program world)) (changes world) [cancelAt world, cancelAt world + later]
     }
  where
-  start = Now {clock = 0, levels = Map.fromList (conditions world), calls = Map.empty, shared = [], answers = Map.empty, retracted = Set.empty}
+  start = Now {clock = 0, levels = Map.fromList (conditions world), calls = Map.empty, shared = [], childResults = Map.empty, childStopRequests = Set.empty}
 
--- | A program that is about to run.
+-- | The state of a program that is about to run.
 begin :: Now -> Program -> Running
 begin t p = case p of
   Do name scripts -> Calling name scripts
@@ -45,38 +45,38 @@ begin t p = case p of
   Then first second -> andThen t (begin t first) second
   Else first second -> orElse t (begin t first) second
   Attempt n act
-    | n <= 0 -> Over (Failed nothingElse)
+    | n <= 0 -> Over (Failed noAlternative)
     | n == 1 -> begin t act
     | otherwise -> begin t (act `Else` Attempt (n - 1) act)
-  FallbackOver [] -> Over (Failed nothingElse)
+  FallbackOver [] -> Over (Failed noAlternative)
   FallbackOver [act] -> begin t act
   FallbackOver (act : acts) -> begin t (act `Else` FallbackOver acts)
-  Parallel left right -> Looking Race [thread t "parallel: left" (void left), thread t "parallel: right" (void right)]
-  Both left right -> Looking Gather [thread t "both: left" left, thread t "both: right" right] `AndThen` Pure Unit
-  FirstOf [] -> Over (Failed nothingElse)
-  FirstOf acts -> Looking Race (numbered "firstOf: " acts)
-  AllOf acts -> Looking Gather (numbered "allOf: " acts)
-  Scoped body -> Looking Nursery [thread t "scoped: body" body]
+  Parallel left right -> Waiting Race [thread t "parallel: left" (void left), thread t "parallel: right" (void right)]
+  Both left right -> Waiting Gather [thread t "both: left" left, thread t "both: right" right] `AndThen` Pure Unit
+  FirstOf [] -> Over (Failed noAlternative)
+  FirstOf acts -> Waiting Race (numbered "firstOf: " acts)
+  AllOf acts -> Waiting Gather (numbered "allOf: " acts)
+  Scoped body -> Waiting Nursery [thread t "scoped: body" body]
   Fork act -> Forking act Nothing
   Await act meanwhile -> Forking act (Just (False, meanwhile))
-  Retract act meanwhile -> Forking act (Just (True, meanwhile))
-  Timeout limit' _ -> Reacting p (Deadline (clock t + limit')) Always (Choosing First)
-  _ | any borrows (signals p) -> Opening p
+  StopChild act meanwhile -> Forking act (Just (True, meanwhile))
+  Timeout limit' _ -> Reacting p (Deadline (clock t + limit')) Always (Choosing FirstRead)
+  _ | any usesShared (signals p) -> Opening p
     | otherwise -> opened t p
  where
   void act = act `Then` Pure Unit
   numbered operator acts = [thread t (operator ++ show n) act | (n, act) <- zip [1 :: Int ..] acts]
 
--- | An operator on signals that is about to look.
+-- | An operator on signals, which opens its signal.
 opened :: Now -> Program -> Running
 opened t p = case p of
   WithShared signal body -> Sharing (open t signal) (thread t "withShared: body" body)
-  TeleoReactive rules -> following (startedAt t (Joined FirstHolding (map (made . fst) rules)))
+  TeleoReactive rules -> following (startSource t (Joined FirstHolding (map (unstarted . fst) rules)))
   _ -> case signals p of
     signal : _ -> following (open t signal)
     [] -> error "opened: this operator has no signal"
  where
-  following source = Reacting p source (viewOf t source) (Choosing First)
+  following source = Reacting p source (viewOf t source) (Choosing FirstRead)
 
 andThen, orElse :: Now -> Running -> Program -> Running
 andThen t (Over (Succeeded _)) second = begin t second
@@ -92,14 +92,14 @@ ended name = \case
   Fails -> Failed name
   Faults -> Faulted name
 
--- | A thread, which may be asked to stop before it does anything at all, even end.
+-- | A new thread, whose stop may be requested before its first step.
 thread :: Now -> Label -> Program -> Thread
-thread t label p = Thread label (Living Unborn starting)
+thread t label p = Thread label (Live NotStarted starting)
  where
   starting = if canWait begun then begun else Starting p
   begun = begin t p
-  -- As long as it has not started branches of its own, nor ended, there is no telling
-  -- whether it has begun. So take it that it has: that keeps the states few.
+  -- Until the program starts branches or ends, it makes no difference whether it has begun.
+  -- Then it has begun, which keeps the number of states small.
   canWait = \case
     Calling _ _ -> True
     Forking _ _ -> True

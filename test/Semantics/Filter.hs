@@ -1,101 +1,103 @@
 -- |
--- Those who look at signals, and what the ones that filter them remember.
+-- Stop requests, views, and the states of filters.
 module Semantics.Filter
-  ( -- * Who looks
+  ( -- * Requests and readers
     Request (..)
   , View (..)
   , Worker (..)
 
-    -- * What is made of what they see
+    -- * States of filters
   , Join (..)
-  , Memory (..)
+  , HysteresisState (..)
   , Debouncer (..)
-  , Noticing (..)
+  , ChangeTracking (..)
   , Watchdog (..)
-  , Guarding (..)
+  , WatchdogState (..)
   ) where
 
 import Semantics.Program
 
--- | An operator asks a thread to stop once at most, but others may ask it again.
+-- | The stop requests of a thread. An operator makes at most one, but a thread outside of
+-- the operators may make two.
 data Request
-  = -- | Perhaps it has not even been started.
-    Unborn
-  | Unasked
-  | Asked
-  | -- | It has heard neither.
-    AskedTwice
-  | -- | Time has passed since, and it could not hear: it will as soon as it can, before it
-    -- does anything else.
+  = -- | The thread may not have been started yet.
+    NotStarted
+  | NoRequest
+  | Requested
+  | -- | Neither request was received.
+    RequestedTwice
+  | -- | Time has passed since the request, which could not be received: it will be received
+    -- before any other step of the thread.
     Pending
   | PendingTwice
-  | -- | One is due, and another has come.
-    PendingAndAsked
-  | Heard
+  | -- | One request is pending, and time has not passed since another.
+    PendingAndRequested
+  | Received
   deriving (Eq, Ord, Show)
 
--- | Which of the values count for someone: those that came after he asked.
+-- | Which values a reader accepts: only those of readings that began after its view was
+-- taken.
 data View
   = Always
-  | -- | Of the readings, those after so many.
+  | -- | Accepts only readings with a higher number.
     After Int View
   | Each [View]
   deriving (Eq, Ord, Show)
 
--- | A thread that looks at a source from its start on.
+-- | A filter's thread, which reads the filtered source.
 data Worker = Worker
   { request :: Request
   , view :: View
   }
   deriving (Eq, Ord, Show)
 
--- | How several values are one.
+-- | How several values are combined.
 data Join
   = AllHold
-  | -- | The place of the first that holds, or -1.
+  | -- | The index of the first that holds, or -1.
     FirstHolding
   deriving (Eq, Ord, Show)
 
--- | Of a hysteresis.
-data Memory = Memory
+-- | The state of a hysteresis.
+data HysteresisState = HysteresisState
   { low, high :: Int
   , isHigh :: Bool
-  , reminder :: Worker
+  , hysteresisWorker :: Worker
   }
   deriving (Eq, Ord, Show)
 
 data Debouncer = Debouncer
   { delay :: Ticks
   , settled :: Maybe Int
-  -- ^ What counts.
+  -- ^ The debounced value.
   , pending :: Maybe (Int, Ticks)
-  -- ^ What does not count yet, and since when it is there.
-  , noticer :: Worker
-  , noticing :: Noticing
+  -- ^ The value that is not settled yet, and since when it has lasted.
+  , changeWorker :: Worker
+  , changeTracking :: ChangeTracking
   , timer :: Request
-  , timing :: Maybe (Int, Ticks)
-  -- ^ What was pending when the timer was set.
+  , timedChange :: Maybe (Int, Ticks)
+  -- ^ The pending change for which the timer was started.
   }
   deriving (Eq, Ord, Show)
 
--- | To notice a value takes two steps: it is seen, and it is written down.
-data Noticing
-  = Noted (Maybe Int)
-  | Noticed (Maybe Int) Int
+-- | Tracking a change takes two steps: the value is read, and then it is stored.
+data ChangeTracking
+  = Tracked (Maybe Int)
+  | Observed (Maybe Int) Int
   deriving (Eq, Ord, Show)
 
 data Watchdog = Watchdog
   { limit :: Ticks
   , overdue :: Int
-  -- ^ Odd while a reading is, and higher whenever one has been.
-  , guard :: Request
-  , guarding :: Guarding
+  -- ^ Odd while a reading is overdue. It only increases.
+  , watchdogRequest :: Request
+  , watchdogState :: WatchdogState
   }
   deriving (Eq, Ord, Show)
 
--- | What the watchdog knows of the oldest reading: since when it is under way.
-data Guarding
-  = Free
-  | Due Ticks
-  | Late Ticks
+-- | The watchdog's state: since when the oldest reading has been in flight.
+data WatchdogState
+  = NoReading
+  | InFlight Ticks
+  | Overdue Ticks
   deriving (Eq, Ord, Show)

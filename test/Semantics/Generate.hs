@@ -3,7 +3,7 @@
 -- |
 -- Random programs and worlds.
 --
--- Lengths of time are few and small, so that ties are frequent.
+-- Durations are few and small, so that ties are frequent.
 module Semantics.Generate
   ( worlds
   , smallWorlds
@@ -15,18 +15,18 @@ import Test.QuickCheck
 import Semantics.Parts
 import Semantics.Program
 
--- | Worlds with programs that nest up to so many operators deep.
+-- | Worlds with programs up to the given depth.
 worlds :: Int -> Gen World
 worlds deep = do
-  levels' <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure Lost)]) known
+  levels' <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure NoValue)]) known
   World levels' <$> someChanges <*> choose (4, 16) <*> (renamed <$> programs deep) <*> callers <*> pure 0
  where
   someChanges = do
     n <- choose (0, 8)
     inOrder <$> vectorOf n (Change <$> choose (0, 8) <*> elements known <*> someLevel)
-  someLevel = frequency [(30, At <$> choose (0, 2)), (1, pure Lost), (1, pure Failing), (1, pure Faulting)]
+  someLevel = frequency [(30, At <$> choose (0, 2)), (1, pure NoValue), (1, pure Failing), (1, pure Faulting)]
 
--- | Worlds so small that all that can happen in them can be tried.
+-- | Worlds that are small enough to try all their schedules.
 smallWorlds :: Gen World
 smallWorlds = do
   first <- At <$> choose (0, 1)
@@ -34,10 +34,10 @@ smallWorlds = do
   changes' <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
   World [("p", first), ("q", At 0)] changes' <$> choose (2, 4) <*> (renamed <$> programs 1) <*> callers <*> pure 0
  where
-  someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure Lost)]
+  someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure NoValue)]
 
 callers :: Gen Caller
-callers = frequency [(3, pure Operator), (1, Stranger <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))]
+callers = frequency [(3, pure Operator), (1, PlainThread <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))]
 
 inOrder :: [Change] -> [Change]
 inOrder = sortOn (\(Change at _ _) -> at)
@@ -45,11 +45,12 @@ inOrder = sortOn (\(Change at _ _) -> at)
 known :: [Condition]
 known = ["p", "q"]
 
--- | Programs that nest up to so many operators deep, outside of any scope.
+-- | Programs up to the given depth, outside of any scope.
 programs :: Int -> Gen Program
 programs = within' False False
 
--- | Those that may fork, and those that may follow what is shared.
+-- | Programs that may fork if the first argument is true, and that may use the shared signal
+-- if the second is.
 within' :: Bool -> Bool -> Int -> Gen Program
 within' inScope sharing = go
  where
@@ -60,7 +61,7 @@ within' inScope sharing = go
       , (1, Pure . Number <$> choose (0, 2))
       , (1, WaitUntil <$> signal 0)
       ]
-        ++ (if inScope then [(8, Fork <$> action), (4, Await <$> action <*> action), (2, Retract <$> action <*> action)] else [])
+        ++ (if inScope then [(8, Fork <$> action), (4, Await <$> action <*> action), (2, StopChild <$> action <*> action)] else [])
   go n =
     frequency $
       [ (1, go 0)
@@ -82,7 +83,7 @@ within' inScope sharing = go
       , (2, Scoped <$> within' True sharing (n - 1))
       , (2, WithShared <$> sensed <*> within' False True (n - 1))
       ]
-        ++ (if inScope then [(3, Fork <$> less), (3, Await <$> less <*> less), (2, Retract <$> less <*> less)] else [])
+        ++ (if inScope then [(3, Fork <$> less), (3, Await <$> less <*> less), (2, StopChild <$> less <*> less)] else [])
    where
     less = frequency [(1, choose (0, n - 1)), (2, pure (n - 1))] >>= go
     sensed = signal (n - 1)
@@ -107,7 +108,7 @@ within' inScope sharing = go
       ]
         ++ [(6, pure Shared) | sharing]
         ++ [(2, signal 0)]
-  -- One that takes no time, while the condition holds, would go on for ever.
+  -- A recovery that takes no time would repeat for ever while the condition holds.
   takingTime later = Then <$> (Do "a" . pure . (\s -> s {takes = max 1 (takes s)}) <$> script) <*> later
 
 action :: Gen Program
@@ -122,7 +123,7 @@ script =
     <*> frequency
       [ (4, pure StopsAtOnce)
       , (2, StopsAfter <$> choose (0, 3))
-      , (2, TidiesUp <$> choose (0, 3))
+      , (2, CleansUpInterruptibly <$> choose (0, 3))
       , (2, EndsAfter <$> choose (0, 2) <*> (Succeeds <$> choose (0, 2)))
       , (1, EndsAfter <$> choose (0, 2) <*> pure Fails)
       , (1, EndsAfter <$> choose (0, 2) <*> pure Faults)

@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Programs as trees: their parts, and others in the place of these.
+-- Programs as trees: their parts, and how to replace them.
 module Semantics.Parts
   ( parts
   , rebuild
@@ -13,7 +13,7 @@ import Data.Bifunctor (first)
 
 import Semantics.Program
 
--- | The programs of which a program is made, those of its signals first.
+-- | The direct parts of a program, those of its signals first.
 parts :: Program -> [Program]
 parts = \case
   Do _ _ -> []
@@ -37,7 +37,7 @@ parts = \case
   Scoped a -> [a]
   Fork a -> [a]
   Await a b -> [a, b]
-  Retract a b -> [a, b]
+  StopChild a b -> [a, b]
 
 ofSignal :: Signal -> [Program]
 ofSignal = \case
@@ -49,7 +49,7 @@ ofSignal = \case
   StaleAfter _ s -> ofSignal s
   Shared -> []
 
--- | The program made of other parts, as many as it has.
+-- | The program with other parts, as many as it has.
 rebuild :: Program -> [Program] -> Program
 rebuild p new = case (p, new) of
   (Then _ _, [a, b]) -> Then a b
@@ -71,13 +71,13 @@ rebuild p new = case (p, new) of
   (Scoped _, [a]) -> Scoped a
   (Fork _, [a]) -> Fork a
   (Await _ _, [a, b]) -> Await a b
-  (Retract _ _, [a, b]) -> Retract a b
+  (StopChild _ _, [a, b]) -> StopChild a b
   _ -> p
  where
   ruled ((s, _) : rules) as | (s', a : as') <- sensing s as = (s', a) : ruled rules as'
   ruled _ _ = []
 
--- | The signal made of other programs, and those that are left.
+-- | The signal with other programs, and the programs that are left.
 sensing :: Signal -> [Program] -> (Signal, [Program])
 sensing signal as = case (signal, as) of
   (Polled n _, a : others) -> (Polled n a, others)
@@ -87,11 +87,11 @@ sensing signal as = case (signal, as) of
   (StaleAfter n s, _) -> first (StaleAfter n) (sensing s as)
   _ -> (signal, as)
 
--- | How deep a program nests.
+-- | The depth of a program.
 depth :: Program -> Int
 depth p = maximum (0 : map ((+ 1) . depth) (parts p))
 
--- | The programs with another signal in the place of one of theirs.
+-- | The programs in which one signal is replaced.
 resignal :: (Signal -> [Signal]) -> Program -> [Program]
 resignal with = \case
   RSelect s a b -> [RSelect s' a b | s' <- with s]

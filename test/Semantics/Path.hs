@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Paths of the relation: whether a timeline is one, and which there are.
+-- Paths of the relation: whether a timeline belongs to one, and all that there are.
 module Semantics.Path
   ( -- * Is it a path?
     Seen (..)
@@ -12,7 +12,7 @@ module Semantics.Path
     -- * All paths
   , paths
 
-    -- * What can be seen
+    -- * What is observed
   , everything
   , whatIsDone
   ) where
@@ -29,7 +29,7 @@ import Semantics.Program
 import Semantics.State (Now (clock), Running (Over), State (..))
 import Semantics.Step
 
--- | What could be seen of a run, and how it ended.
+-- | The observed timeline of a run, and how the run ended.
 data Seen = Seen
   { timeline :: Timeline
   , end :: End
@@ -38,25 +38,25 @@ data Seen = Seen
 
 data End
   = Gave Ticks Result
-  | -- | Nothing can happen any more, and time does not help.
+  | -- | No step is possible, now or later.
     Deadlock
-  | -- | It was cut off then.
+  | -- | The run was cut off at this time.
     Unknown Ticks
   deriving (Eq, Ord, Show)
 
 data Verdict
   = Possible
-  | -- | The timeline is none of the relation from the given event on; this is what was
-    -- possible instead.
+  | -- | The rest of the timeline that the relation does not allow, and what it allows instead
+    -- of the first transition of that.
     Impossible Timeline [(Ticks, Transition)]
-  | -- | No path ends so.
+  | -- | No path ends like that; these are the possible ends.
     ImpossibleEnd [End]
-  | -- | There were more states to look at than fuel.
+  | -- | There are more states than the fuel allows.
     OutOfFuel
   deriving (Eq, Show)
 
--- | Whether a run of the world may have been seen so. It is said which events can be seen
--- at all.
+-- | Whether the relation allows the timeline for this world. The second argument selects the
+-- observable transitions.
 explains :: Int -> (Transition -> Bool) -> World -> Seen -> Verdict
 explains fuel visible world seen = go (Set.singleton (initial world)) (filter (visible . snd) (timeline seen))
  where
@@ -69,9 +69,9 @@ explains fuel visible world seen = go (Set.singleton (initial world)) (filter (v
         | otherwise -> ImpossibleEnd ends'
        where
         ends' = mapMaybe endOf (Set.toList these)
-    rest@((t, event) : later) -> case still t of
+    rest@((t, transition) : later) -> case still t of
       Nothing -> OutOfFuel
-      Just these -> case [s' | s <- at t these, (e, s') <- step s, e == event] of
+      Just these -> case [s' | s <- at t these, (e, s') <- step s, e == transition] of
         [] -> Impossible rest [(clock (now s), e) | s <- Set.toList these, (e, _) <- step s, visible e]
         next -> go (Set.fromList next) later
    where
@@ -102,7 +102,7 @@ paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world)
       here
       (Map.toList next)
 
--- | All states that are reached without anything to see, up to a moment.
+-- | All states that are reached without an observable transition, up to the given time.
 silently :: Int -> Ticks -> (Transition -> Bool) -> Maybe Ticks -> Set State -> Maybe (Set State)
 silently fuel slip visible limit states = go states (Set.toList states)
  where
@@ -122,21 +122,21 @@ silently fuel slip visible limit states = go states (Set.toList states)
     [] -> [later | later <- pass slip s, maybe True (clock (now later) <=) limit]
     next -> [s' | (e, s') <- next, not (visible e)]
 
--- | How the run ended, if it has.
+-- | How the run has ended, if it has.
 endOf :: State -> Maybe End
 endOf s = case running s of
   Over r -> Just (Gave (clock (now s)) r)
   _ | null (step s), null (pass 0 s) -> Just Deadlock
   _ -> Nothing
 
--- | Whether it has not ended, and nothing is left to be done at this moment. (What is in a
--- deadlock does not end either.)
+-- | Whether it has not ended, and no step is left at this time. (A deadlock does not end
+-- either.)
 goesOnAt :: Ticks -> State -> Bool
 goesOnAt t s = case running s of
   Over _ -> False
   _ -> null (step s) && all ((> t) . clock . now) (pass 0 s)
 
--- | Whether an event can be seen.
+-- | Whether a transition is observed.
 everything, whatIsDone :: Transition -> Bool
 everything = (/= Silent)
 whatIsDone = \case

@@ -1,9 +1,9 @@
 -- |
 -- Programs of the language, as plain data.
 --
--- An action is a name and what it does each time it is called: it takes so many
--- ticks, then ends in some way; and it does something of its own when it is asked
--- to stop. A condition is a variable that an environment sets at given times.
+-- An action has a name, and a script for each call: how many ticks it takes, how it then
+-- ends, and how it responds to a stop request. A condition is a variable that the
+-- environment sets at given times.
 module Semantics.Program
   ( -- * Programs
     Program (..)
@@ -22,21 +22,21 @@ module Semantics.Program
   , Condition
   , Level (..)
 
-    -- * Programs and the world that they act in
+    -- * Programs and their environment
   , World (..)
   , Change (..)
   , Caller (..)
   , ExceptionType (..)
 
-    -- * What comes of them
+    -- * Results and transitions
   , Result (..)
   , Value (..)
   , Transition (..)
-  , Deed (..)
+  , ActionEvent (..)
   , Timeline
   , number
   , holds
-  , nothingElse
+  , noAlternative
   , noValue
   , doesNotHold
   , tooLate
@@ -49,13 +49,13 @@ module Semantics.Program
 
 type Name = String
 
--- | Time, and lengths of time.
+-- | A time, or a duration.
 type Ticks = Int
 
 data Program
-  = -- | The n-th call does what the n-th script says; the last one goes on for ever.
+  = -- | The n-th call follows the n-th script; the last script repeats.
     Do Name [Script]
-  | -- | Nothing, with a result.
+  | -- | Returns the value.
     Pure Value
   | -- | @>>@
     Program `Then` Program
@@ -69,8 +69,8 @@ data Program
   | AllOf [Program]
   | RSelect Signal Program Program
   | Monitor Signal Program Program
-  | -- | The branch for a number is that many places from the first; beyond the last
-    -- it is the last.
+  | -- | The number is the index of the branch, from zero; larger numbers select the last
+    -- branch.
     Switch Signal [Program]
   | TeleoReactive [(Signal, Program)]
   | WaitUntil Signal
@@ -83,14 +83,14 @@ data Program
     Fork Program
   | -- | Forks the first, runs the second, and waits for the result of the first.
     Await Program Program
-  | -- | Likewise, but before it waits it asks the first to stop.
-    Retract Program Program
+  | -- | Likewise, but requests the stop of the first before it waits.
+    StopChild Program Program
   deriving (Eq, Ord, Show)
 
--- | A signal carries a number; as a condition it 'holds' or not.
+-- | A signal's value is a number; as a condition it 'holds' or not.
 data Signal
   = Watched Condition
-  | -- | What the program returns is the reading.
+  | -- | The reading is the result of the program, which runs once in each period.
     Polled Ticks Program
   | -- | One where both hold, otherwise zero.
     And Signal Signal
@@ -107,16 +107,16 @@ data Script = Script
   { takes :: Ticks
   , ends :: Ending
   , masking :: Masking
-  , whenAsked :: Response
+  , onStop :: Response
   }
   deriving (Eq, Ord, Show)
 
 data Masking
-  = -- | It hears a request to stop at any moment.
+  = -- | A stop request is received at any moment.
     Unmasked
-  | -- | It hears a request while it waits.
+  | -- | A stop request is received while the action blocks.
     Masked
-  | -- | It hears nothing.
+  | -- | No stop request is received.
     Uninterruptible
   deriving (Eq, Ord, Show, Enum, Bounded)
 
@@ -126,60 +126,60 @@ data Ending
   | Faults
   deriving (Eq, Ord, Show)
 
--- | What an action does that has heard that it should stop.
+-- | What an action does after it has received a stop request.
 data Response
   = StopsAtOnce
-  | -- | Stops after a cleanup of so many ticks.
+  | -- | Stops after a cleanup of the given number of ticks.
     StopsAfter Ticks
-  | -- | Likewise, unless it is asked again: that ends the cleanup.
-    TidiesUp Ticks
-  | -- | Ends after so many ticks in a way of its own: it completes although asked
-    -- to stop, or its cleanup goes wrong.
+  | -- | Likewise, but another stop request ends the cleanup.
+    CleansUpInterruptibly Ticks
+  | -- | Does not stop, but ends after the given number of ticks: it completes, or its
+    -- cleanup fails or faults.
     EndsAfter Ticks Ending
   deriving (Eq, Ord, Show)
 
 type Condition = Name
 
--- | The name of a branch: the operator's, and its own.
+-- | The label of a branch: the operator's name and the branch's.
 type Label = String
 
--- | What a condition may be at.
+-- | The state of a condition.
 data Level
   = At Int
   | -- | There is no value: its transaction retries.
-    Lost
+    NoValue
   | -- | Its transaction throws a failure.
     Failing
   | -- | Its transaction throws a fault.
     Faulting
   deriving (Eq, Ord, Show)
 
--- | A program, the conditions as they are at first, how they change, and when the
--- caller loses patience and the program is asked to stop.
+-- | A program, the initial levels of the conditions, their changes, and when the caller
+-- cancels the program.
 data World = World
   { conditions :: [(Condition, Level)]
   , changes :: [Change]
   -- ^ In the order of their times.
-  , patience :: Ticks
+  , cancelAt :: Ticks
   , program :: Program
   , caller :: Caller
   , slippage :: Ticks
-  -- ^ By less than so much a timer may be late.
+  -- ^ A timer may be late by less than this.
   }
   deriving (Eq, Ord, Show)
 
--- | Who asks the program to stop.
+-- | The origin of the cancellation.
 data Caller
   = -- | An operator.
     --
     -- > firstOf [program, the environment, which makes the changes]
     Operator
-  | -- | A thread that knows nothing of operators; after the given number of ticks it throws
-    -- again.
-    Stranger ExceptionType Ticks
+  | -- | The program runs in a thread of its own, to which another thread throws an exception;
+    -- and a second one after the given number of ticks.
+    PlainThread ExceptionType Ticks
   deriving (Eq, Ord, Show)
 
--- | Of what type the exceptions are that a stranger throws.
+-- | The type of the exceptions that are thrown to a 'PlainThread'.
 data ExceptionType = Asynchronous | Synchronous
   deriving (Eq, Ord, Show)
 
@@ -192,7 +192,7 @@ data Result
   = Succeeded Value
   | Failed String
   | Faulted String
-  | -- | It stopped because it was asked to; perhaps it met a fault on the way.
+  | -- | It stopped because of a stop request; a fault may have occurred while it stopped.
     Stopped (Maybe String)
   deriving (Eq, Ord, Show)
 
@@ -202,30 +202,30 @@ data Value
   | Several [Value]
   deriving (Eq, Ord, Show)
 
--- | What happens in a step.
+-- | The observable part of a step.
 data Transition
-  = -- | Nothing that anybody can see.
+  = -- | Not observable.
     Silent
-  | Name `Does` Deed
+  | Action Name ActionEvent
   | Becomes Condition Level
-  | -- | The branch of this name is known to have ended.
+  | -- | The end of the branch with this label is published.
     IsOver Label
   deriving (Eq, Ord, Show)
 
-data Deed
+data ActionEvent
   = Begins
-  | -- | It has ended by itself, or its cleanup has.
+  | -- | It has ended without stopping, by itself or by its cleanup.
     Ends Ending
-  | -- | It has heard that it should stop (and if it stops at once, has stopped).
-    Hears
+  | -- | It has received a stop request (and has stopped, if it stops at once).
+    ReceivesStop
   | -- | It has stopped, after a cleanup.
     Stops
   deriving (Eq, Ord, Show)
 
--- | What could be seen, and when.
+-- | The observed transitions and their times.
 type Timeline = [(Ticks, Transition)]
 
--- | A result as a number, for those who read signals.
+-- | A result as a signal's value.
 number :: Value -> Int
 number (Number n) = n
 number _ = 0
@@ -236,8 +236,8 @@ holds = (> 0)
 
 -- The library's own failures.
 
-nothingElse, noValue, doesNotHold, tooLate, childStopped :: String
-nothingElse = "Failed"
+noAlternative, noValue, doesNotHold, tooLate, childStopped :: String
+noAlternative = "Failed"
 noValue = "FailedBecause \"the signal has no value any more\""
 doesNotHold = "FailedBecause \"the condition does not hold\""
 tooLate = "FailedBecause \"fork: the nursery's scoped behaviour is ending\""
@@ -249,10 +249,10 @@ timedOut n = "TimedOut " ++ show n ++ ".0"
 overdueBy :: Ticks -> String
 overdueBy n = "FailedBecause \"no reading of the signal within " ++ show n ++ ".0 s\""
 
--- | The name under which the cleanup of an action fails or faults.
+-- | The name in the failure or fault of an action's cleanup.
 cleanupOf :: Name -> String
 cleanupOf name = name ++ "'s cleanup"
 
--- | The result of a world in which the caller has lost patience.
+-- | The result of a world in which the program was cancelled by its 'Operator'.
 timeIsUp :: Value
 timeIsUp = Several [Unit, Unit, Unit]

@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- A program of the specification, as a behaviour on the library's own operators.
+-- Runs a program of the specification with the library's operators, in the simulator.
 module Semantics.Run
   ( observed
   , allObserved
@@ -61,14 +61,14 @@ import qualified Behavior.Sim as Sim
 import Semantics.Path (End (..), Seen (..))
 import Semantics.Program hiding (Label)
 
--- | Simulates the world's program under a schedule, and gives what could be seen; or
--- says why there was no end to see.
+-- | Simulates the world's program under a schedule, and returns what was observed, or the
+-- reason why the run had no proper end.
 observed :: Schedule -> World -> IO (Either String Seen)
 observed how world = observing (simulateWith (limits world) {scheduled = how}) world
 
--- | Simulates the world's program under all schedules with up to so many pre-emptions,
--- but under no more schedules than the second number, and gives all that could be seen
--- and whether those were all the schedules.
+-- | Simulates the world's program under all schedules with up to the given number of
+-- pre-emptions, but under no more schedules than the second number. Returns all that was
+-- observed, and whether those were all the schedules.
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
@@ -83,40 +83,40 @@ limits world = defaults {livelockLimit = 20000, endAt = 60, slip = fromIntegral 
 
 observing :: (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Seen)
 observing simulated world = do
-  happened <- newIORef []
-  -- In the record of the run is when it happened.
-  let tell event = modifyIORef' happened (event :) >> annotate (show event)
-  run <- simulated (behavior tell world)
-  told <- reverse <$> readIORef happened
-  let record = recorded (Sim.steps run) told
+  emittedRef <- newIORef []
+  -- The steps of the run have the times of the transitions.
+  let emit transition = modifyIORef' emittedRef (transition :) >> annotate (show transition)
+  run <- simulated (behavior emit world)
+  emitted <- reverse <$> readIORef emittedRef
+  let record = recorded (Sim.steps run) emitted
       seen e = Right Seen {timeline = record, end = e}
-      gave = seen . Gave (ticks (finished run))
-  inFull $ case outcome run of
-    Sim.Returned value -> gave (Succeeded value)
-    Sim.Failing e -> gave (thrown e)
-    Sim.Faulting e -> gave (thrown e)
-    Sim.Cancelled e -> gave (thrown e)
+      returnedWith = seen . Gave (ticks (finished run))
+  evaluated $ case outcome run of
+    Sim.Returned value -> returnedWith (Succeeded value)
+    Sim.Failing e -> returnedWith (thrown e)
+    Sim.Faulting e -> returnedWith (thrown e)
+    Sim.Cancelled e -> returnedWith (thrown e)
     Sim.OutOfTime -> seen (Unknown (ticks (finished run)))
     Sim.Deadlock _ -> Left "a deadlock, though there is an end to wait for"
     Sim.Livelock labels -> Left ("livelock: " ++ show labels)
-    Sim.BlockedOutside who _ -> Left ("outside: " ++ show who)
-    Sim.ExternalWakeup waiting -> Left ("meddled: " ++ show waiting)
-    Sim.TooSlow who _ -> Left ("too slow: " ++ show who)
-    Sim.ScheduleMismatch why -> Left ("misfit: " ++ why)
+    Sim.BlockedOutside label' _ -> Left ("blocked outside: " ++ show label')
+    Sim.ExternalWakeup waiting -> Left ("external wakeup: " ++ show waiting)
+    Sim.TooSlow label' _ -> Left ("too slow: " ++ show label')
+    Sim.ScheduleMismatch why -> Left ("schedule mismatch: " ++ why)
  where
-  -- (Otherwise it would keep the whole run.)
-  inFull whole = whole <$ evaluate (whole == whole)
+  -- Evaluated, so that it does not keep the whole run in memory.
+  evaluated whole = whole <$ evaluate (whole == whole)
   ticks = round
-  recorded (s : others) events = case (did s, events) of
-    (Note _, event : later) -> (ticks (at s), event) : recorded others later
-    -- The relation speaks of branches only.
-    (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others events
-    _ -> recorded others events
+  recorded (s : others) transitions = case (did s, transitions) of
+    (Note _, transition : later) -> (ticks (at s), transition) : recorded others later
+    -- The relation has the ends of branches only.
+    (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others transitions
+    _ -> recorded others transitions
   recorded [] _ = []
   isBranch (Label _ name) = name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "hysteresis"]
 
--- | Where a program acts: what the conditions are at, how often actions were called,
--- where to fork, and what is shared.
+-- | The state that a program runs with: the conditions, the number of calls of each action,
+-- how to fork into the innermost scope, and the innermost shared signal.
 data Stage = Stage
   { levels :: Map Condition (TVar Level)
   , calls :: IORef (Map Name Int)
@@ -124,22 +124,22 @@ data Stage = Stage
   , nearest :: Library.Signal Int
   }
 
--- | The world's program and environment. What can be seen is told to the given
--- action, which must not be a scheduling point.
+-- | The world's program and environment. The given action receives each transition; it must
+-- not be a scheduling point.
 behavior :: (Transition -> IO ()) -> World -> Behavior Value
-behavior tell world = do
+behavior emit world = do
   stage <- Stage <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure noNursery <*> pure (pure 0)
-  let played = play tell stage (program world)
+  let running = toBehavior emit stage (program world)
   case caller world of
-    Operator -> firstOf [played, timeIsUp <$ environment stage]
-    Stranger type' later -> do
-      thread <- mask_ (start (Sim.Label "stranger" "") played)
+    Operator -> firstOf [running, timeIsUp <$ environment stage]
+    PlainThread type' later -> do
+      thread <- mask_ (start (Sim.Label "plain thread" "") running)
       let interrupting = case type' of
             Asynchronous -> throwToAll (const Enough) [threadId thread]
             Synchronous -> throwToAll (const EnoughOfThis) [threadId thread]
       environment stage
       interrupting
-      sleepUntil (fromIntegral (patience world + later))
+      sleepUntil (fromIntegral (cancelAt world + later))
       interrupting
       atomically (threadEnd thread) >>= either throwIO pure
  where
@@ -147,12 +147,12 @@ behavior tell world = do
     for_ (changes world) $ \(Change when condition level) -> do
       sleepUntil (fromIntegral when)
       for_ (Map.lookup condition (levels stage)) $ \var -> atomically (writeTVar var level)
-      tell (condition `Becomes` level)
-    sleepUntil (fromIntegral (patience world))
+      emit (condition `Becomes` level)
+    sleepUntil (fromIntegral (cancelAt world))
   noNursery _ = throwIO (ErrorCall "a fork outside every scope")
 
-play :: (Transition -> IO ()) -> Stage -> Program -> Behavior Value
-play tell stage = go
+toBehavior :: (Transition -> IO ()) -> Stage -> Program -> Behavior Value
+toBehavior emit stage = go
  where
   go :: Program -> Behavior Value
   go = \case
@@ -160,7 +160,7 @@ play tell stage = go
       checkpoint
       n <- atomicModifyIORef' (calls stage) $ \counts ->
         let n = Map.findWithDefault 0 name counts in (Map.insert name (n + 1) counts, n)
-      act (\deed -> tell (name `Does` deed)) name (scripts !! min n (length scripts - 1))
+      act (\deed -> emit (Action name deed)) name (scripts !! min n (length scripts - 1))
     Pure value -> pure value
     Then first second -> go first >> go second
     Else first second -> go first ? go second
@@ -177,11 +177,11 @@ play tell stage = go
     WaitUntil signal -> Unit <$ waitUntil (holds <$> level signal)
     WhileHolding signal p -> whileHolding (holds <$> level signal) (go p)
     Timeout limit p -> timeout (fromIntegral limit) (go p)
-    WithShared signal p -> withShared (level signal) (\s -> play tell stage {nearest = s} p)
-    Scoped body -> scoped (\nursery -> play tell stage {forking = fork nursery} body)
+    WithShared signal p -> withShared (level signal) (\s -> toBehavior emit stage {nearest = s} p)
+    Scoped body -> scoped (\nursery -> toBehavior emit stage {forking = fork nursery} body)
     Fork p -> Unit <$ forking stage (go p)
     Await p q -> forking stage (go p) >>= \child -> go q >> atomically (await child)
-    Retract p q -> forking stage (go p) >>= \child -> go q >> requestStop child >> atomically (await child)
+    StopChild p q -> forking stage (go p) >>= \child -> go q >> requestStop child >> atomically (await child)
   level = \case
     Watched condition -> watching (reading condition)
     Polled every p -> number <$> polling (fromIntegral every) (go p)
@@ -196,25 +196,25 @@ play tell stage = go
     Just var ->
       readTVar var >>= \case
         At n -> pure n
-        Lost -> retry
+        NoValue -> retry
         Failing -> throwSTM (Failure condition)
         Faulting -> throwSTM (Fault condition)
 
 -- | One call of an action.
-act :: (Deed -> IO ()) -> Name -> Script -> Behavior Value
-act tell name script = do
-  tell Begins
+act :: (ActionEvent -> IO ()) -> Name -> Script -> Behavior Value
+act emit name script = do
+  emit Begins
   mask $ \restore ->
     try (inState restore (wait (takes script))) >>= \case
       Right () -> finish name (ends script)
       Left e
         | not (isStopRequest e) -> throwIO e
         | otherwise -> do
-            tell Hears
-            case whenAsked script of
+            emit ReceivesStop
+            case onStop script of
               StopsAtOnce -> throwIO e
-              StopsAfter n -> clean n >> tell Stops >> throwIO e
-              TidiesUp n -> (wait n `onException` tell Hears) >> tell Stops >> throwIO e
+              StopsAfter n -> clean n >> emit Stops >> throwIO e
+              CleansUpInterruptibly n -> (wait n `onException` emit ReceivesStop) >> emit Stops >> throwIO e
               EndsAfter n how -> clean n >> finish (cleanupOf name) how
  where
   inState restore = case masking script of
@@ -222,14 +222,15 @@ act tell name script = do
     Masked -> id
     Uninterruptible -> uninterruptibleMask_
   finish :: Name -> Ending -> IO Value
-  finish who how = do
-    tell (Ends how)
+  finish name' how = do
+    emit (Ends how)
     case how of
       Succeeds n -> pure (Number n)
-      Fails -> throwIO (Failure who)
-      Faults -> throwIO (Fault who)
+      Fails -> throwIO (Failure name')
+      Faults -> throwIO (Fault name')
   clean n = uninterruptibleMask_ (wait n)
-  -- Also what takes no time can be interrupted by others, or be overtaken by them.
+  -- Zero ticks are a scheduling point, too: other threads can interrupt this one there, or
+  -- run before it.
   wait n = if n > 0 then sleep (fromIntegral n) else checkpoint
 
 -- | An exception that the run ended with, as a result.
@@ -249,11 +250,12 @@ instance Exception Failure where
   toException = behaviorFailedToException
   fromException = behaviorFailedFromException
 
--- | Whether it stops what runs; what a stranger throws does, whatever its type.
+-- | Whether the exception stops the program; those of a 'PlainThread' do, of either type.
 isStopRequest :: SomeException -> Bool
 isStopRequest e = isCancellation e || isJust (fromException e :: Maybe EnoughOfThis)
 
--- | What a stranger throws, of an asynchronous type and of a synchronous one.
+-- | The exceptions that are thrown to a 'PlainThread', of an asynchronous and a synchronous
+-- type.
 data Enough = Enough
   deriving (Show)
 

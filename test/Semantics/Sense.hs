@@ -1,15 +1,15 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What runs for a signal: pollers that read, and those that look at what they read.
+-- The steps of the threads that run for a signal: pollers, and the workers of filters.
 module Semantics.Sense
   ( -- * Steps
-    Action (..)
+    Effect (..)
   , Steps
   , silently
   , oneOf
 
-    -- * Of what runs for a signal
+    -- * Steps of sources
   , sourceSteps
   ) where
 
@@ -20,41 +20,41 @@ import Semantics.Program
 import Semantics.Source
 import Semantics.State
 
--- | A step of a part of the program may also be one that is its surroundings' business.
-data Action
-  = Happens Transition
-  | -- | Perhaps an answer is wanted, by that number.
+-- | What a step does outside of its own part of the program.
+data Effect
+  = Emits Transition
+  | -- | Forks a child; its number, if its result is awaited.
     Forks (Maybe Int) Program
-  | -- | It fails to fork, which is so only while its nursery is ending.
+  | -- | The fork fails, which is possible only while the nursery is ending.
     Refused
 
-type Steps a = [(Action, Now, a)]
+type Steps a = [(Effect, Now, a)]
 
 silently :: Now -> a -> Steps a
-silently t a = [(Happens Silent, t, a)]
+silently t a = [(Emits Silent, t, a)]
 
--- | What may happen in one of several that run side by side.
+-- | The steps of one of several concurrent parts.
 oneOf :: (a -> Steps a) -> [a] -> Steps [a]
 oneOf one = \case
   [] -> []
   a : as -> [(l, t, a' : as) | (l, t, a') <- one a] ++ [(l, t, a : as') | (l, t, as') <- oneOf one as]
 
--- | The steps of all that runs for a source. (It is said how a reading, which is a program,
--- takes its steps, and how it hears a request to stop.)
+-- | The steps of all threads of a source. (The functions are for a reading, which is a
+-- program: its steps, and how it receives a stop request.)
 sourceSteps
   :: (Now -> Running -> Steps Running)
   -> (Now -> Running -> [(Transition, Running)])
   -> Now
   -> Source
   -> Steps Source
-sourceSteps steps hear = go
+sourceSteps steps receive = go
  where
   go t = \case
-    Polling s -> [(l, t', Polling s') | (l, t', s') <- pollerSteps steps hear t s]
+    Polling s -> [(l, t', Polling s') | (l, t', s') <- pollerSteps steps receive t s]
     Joined how sources -> [(l, t', Joined how sources') | (l, t', sources') <- oneOf (go t) sources]
-    Remembering m source -> inside t (Remembering m) source ++ reminds t m source
-    Settling d source -> inside t (Settling d) source ++ settles t d source
-    Guarding w source -> inside t (Guarding w) source ++ [(l, t', Guarding w' source) | (l, t', w') <- guards t w source]
+    WithHysteresis m source -> inside t (WithHysteresis m) source ++ hysteresisSteps t m source
+    Debounced d source -> inside t (Debounced d) source ++ debounceSteps t d source
+    WithWatchdog w source -> inside t (WithWatchdog w) source ++ [(l, t', WithWatchdog w' source) | (l, t', w') <- watchdogSteps t w source]
     _ -> []
   inside t around source = [(l, t', around source') | (l, t', source') <- go t source]
 
@@ -64,84 +64,85 @@ pollerSteps
   -> Now
   -> Poller
   -> Steps Poller
-pollerSteps steps hear t s =
+pollerSteps steps receive t s =
     case poll s of
       Sleeping until'
         | clock t >= until' ->
             silently t $
               read'
-                s {slot = clock t + period s, readings = readings s + 1, underWay = Just (clock t)}
+                s {slot = clock t + period s, readings = readings s + 1, inFlightSince = Just (clock t)}
                 (begin t (sensor s))
       Reading r -> [(l, t', read' s r') | (l, t', r') <- steps t r]
-      Read result ->
-        silently t s {newest = Just (readings s, result), underWay = Nothing, poll = Sleeping (nextSlot (slot s))}
-      Leaving result -> silently t s {poll = Rested (asOutcome result)}
+      Unpublished result ->
+        silently t s {newest = Just (readings s, result), inFlightSince = Nothing, poll = Sleeping (nextSlot (slot s))}
+      EndingWith result -> silently t s {poll = PollEnded (asOutcome result)}
       _ -> []
-      ++ [(Happens event, t, s') | asked s == Asked, (event, s') <- hears]
+      ++ [(Emits transition, t, s') | pollerRequest s == Requested, (transition, s') <- receives]
  where
   read' p = \case
     Over result
-      -- Nobody wants the reading any more; but what went wrong is not lost.
-      | asked p /= Unasked -> p {poll = Leaving result}
-      | otherwise -> p {poll = Read result}
+      -- The reading is not needed any more, but its failure or fault is kept.
+      | pollerRequest p /= NoRequest -> p {poll = EndingWith result}
+      | otherwise -> p {poll = Unpublished result}
     r -> p {poll = Reading r}
-  hears = case poll s of
-    Reading r -> fmap (read' heard) <$> hear t r
-    Leaving _ -> []
-    Rested _ -> []
-    _ -> [(Silent, heard {poll = Rested (Stopped Nothing)})]
-  heard = s {asked = Heard}
+  receives = case poll s of
+    Reading r -> fmap (read' afterReceiving) <$> receive t r
+    EndingWith _ -> []
+    PollEnded _ -> []
+    _ -> [(Silent, afterReceiving {poll = PollEnded (Stopped Nothing)})]
+  afterReceiving = s {pollerRequest = Received}
   -- Slots that were missed are skipped.
   nextSlot due
     | due >= clock t = due
     | otherwise = nextSlot (due + period s)
 
--- | A hysteresis remembers also what its operator does not act on.
-reminds :: Now -> Memory -> Source -> Steps Source
-reminds t m source =
-  case look t First (view worker) (Remembering m source) of
+-- | The worker of a hysteresis updates the state also with values on which the operator does
+-- not act.
+hysteresisSteps :: Now -> HysteresisState -> Source -> Steps Source
+hysteresisSteps t m source =
+  case readSource t FirstRead (view worker) (WithHysteresis m source) of
     Just (Right (high', t', source'))
-      | request worker /= Heard, high' /= fromEnum (isHigh m) -> silently t' source'
+      | request worker /= Received, high' /= fromEnum (isHigh m) -> silently t' source'
     _ -> []
-    ++ [(Happens Silent, t, Remembering m {reminder = worker {request = Heard}} source) | request worker == Asked]
+    ++ [(Emits Silent, t, WithHysteresis m {hysteresisWorker = worker {request = Received}} source) | request worker == Requested]
  where
-  worker = reminder m
+  worker = hysteresisWorker m
 
--- | One notices when the value changes, another counts how long it lasts.
-settles :: Now -> Debouncer -> Source -> Steps Source
-settles t d source =
-  (if request worker == Heard then [] else notices)
-    ++ (if timer d == Heard then [] else silently' times)
-    ++ silently' [d {noticer = worker {request = Heard}} | request worker == Asked]
-    ++ silently' [d {timer = Heard} | timer d == Asked]
+-- | One worker tracks the changes of the value, another measures how long they last.
+debounceSteps :: Now -> Debouncer -> Source -> Steps Source
+debounceSteps t d source =
+  (if request worker == Received then [] else tracks)
+    ++ (if timer d == Received then [] else silently' times)
+    ++ silently' [d {changeWorker = worker {request = Received}} | request worker == Requested]
+    ++ silently' [d {timer = Received} | timer d == Requested]
  where
-  worker = noticer d
-  silently' ds = [(Happens Silent, t, Settling d' source) | d' <- ds]
-  notices = case noticing d of
-    Noted old -> case look t First (view worker) source of
+  worker = changeWorker d
+  silently' ds = [(Emits Silent, t, Debounced d' source) | d' <- ds]
+  tracks = case changeTracking d of
+    Tracked old -> case readSource t FirstRead (view worker) source of
       Just (Right (value, t', source'))
-        | Just value /= old -> silently t' (Settling d {noticing = Noticed old value} source')
+        | Just value /= old -> silently t' (Debounced d {changeTracking = Observed old value} source')
       _ -> []
-    Noticed old value -> silently' [(if isNothing old then counts value else waits value) {noticing = Noted (Just value)}]
+    Observed old value -> silently' [(if isNothing old then counts value else waits value) {changeTracking = Tracked (Just value)}]
   counts value = d {settled = Just value}
   waits value = d {pending = if settled d == Just value then Nothing else Just (value, clock t)}
-  times = case timing d of
-    Nothing -> [d {timing = pending d} | isJust (pending d)]
+  times = case timedChange d of
+    Nothing -> [d {timedChange = pending d} | isJust (pending d)]
     Just (value, since)
       | clock t < since + delay d -> []
-      | pending d == timing d -> [d {settled = Just value, pending = Nothing, timing = Nothing}]
-      | otherwise -> [d {timing = Nothing}]
+      | pending d == timedChange d -> [d {settled = Just value, pending = Nothing, timedChange = Nothing}]
+      | otherwise -> [d {timedChange = Nothing}]
 
 -- | The watchdog.
-guards :: Now -> Watchdog -> Source -> Steps Watchdog
-guards t w source = if guard w == Heard then [] else watches ++ [(Happens Silent, t, w {guard = Heard}) | guard w == Asked]
+watchdogSteps :: Now -> Watchdog -> Source -> Steps Watchdog
+watchdogSteps t w source = if watchdogRequest w == Received then [] else watches ++ [(Emits Silent, t, w {watchdogRequest = Received}) | watchdogRequest w == Requested]
  where
-  watches = case (guarding w, readingOf t source) of
-    (Free, Just since) -> silently t w {guarding = Due since}
-    (Due since, reading)
+  watches = case (watchdogState w, oldestReading t source) of
+    (NoReading, Just since) -> silently t w {watchdogState = InFlight since}
+    (InFlight since, reading)
       | clock t < since + limit w -> []
-      | reading == Just since -> silently t w {overdue = overdue w + 1, guarding = Late since}
-      | otherwise -> silently t w {guarding = Free}
-    (Late since, reading)
-      | reading /= Just since -> silently t w {overdue = overdue w + overdue w `mod` 2, guarding = Free}
+      | reading == Just since -> silently t w {overdue = overdue w + 1, watchdogState = Overdue since}
+      | otherwise -> silently t w {watchdogState = NoReading}
+    (Overdue since, reading)
+      | reading /= Just since -> silently t w {overdue = overdue w + overdue w `mod` 2, watchdogState = NoReading}
     _ -> []

@@ -10,35 +10,35 @@ import Test.QuickCheck
 
 import Semantics.Parts
 import Semantics.Program
-import Semantics.Source (borrows, signals)
+import Semantics.Source (usesShared, signals)
 
 -- | Smaller worlds of the same kind.
 shrinkWorld :: World -> [World]
 shrinkWorld world =
-  [world {program = p} | p <- shrinkProgram (program world), not (strays p)]
+  [world {program = p} | p <- shrinkProgram (program world), not (illScoped p)]
     ++ [world {changes = some} | some <- shrinkList shrinkChange (changes world)]
     ++ [world {caller = Operator} | caller world /= Operator]
     ++ [world {slippage = n} | n <- shrink (slippage world)]
-    ++ [world {patience = n} | n <- shrink (patience world), n > 0]
+    ++ [world {cancelAt = n} | n <- shrink (cancelAt world), n > 0]
  where
   shrinkChange (Change at condition level) =
     [Change at condition (At 0) | level `notElem` [At 0, At 1]] ++ [Change at' condition level | at' <- earlier at]
   earlier at = [at - 1 | at > 0, all (\(Change other _ _) -> other <= at - 1 || other >= at) (changes world)]
 
--- | A fork outside of every scope is no program, nor is a shared signal outside of what
--- shares it. (A fork does not leave what shares: it would live longer.)
-strays :: Program -> Bool
-strays = go False False
+-- | Whether a fork is outside of every scope, or a shared signal outside of its
+-- 'WithShared'. (A fork must not leave a 'WithShared', which it would outlive.)
+illScoped :: Program -> Bool
+illScoped = go False False
  where
   go inScope sharing p = case p of
     Fork a -> not inScope || go inScope sharing a
     Await a b -> not inScope || any (go inScope sharing) [a, b]
-    Retract a b -> not inScope || any (go inScope sharing) [a, b]
+    StopChild a b -> not inScope || any (go inScope sharing) [a, b]
     Scoped a -> go True sharing a
     WithShared s a -> ofSignals inScope sharing [s] || go False True a
     _ -> ofSignals inScope sharing (signals p) || any (go inScope sharing) (parts p)
   ofSignals inScope sharing ss =
-    not sharing && any borrows ss || any (any (go inScope sharing) . parts . WaitUntil) ss
+    not sharing && any usesShared ss || any (any (go inScope sharing) . parts . WaitUntil) ss
 
 shrinkProgram :: Program -> [Program]
 shrinkProgram p = parts p ++ outer ++ inner
@@ -49,7 +49,7 @@ shrinkProgram p = parts p ++ outer ++ inner
     , (n, q) <- zip [0 ..] ps
     , q' <- shrinkPart q
     ]
-  -- What keeps a recovery from going on for ever stays.
+  -- The action that takes time, without which a recovery repeats for ever, is kept.
   shrinkPart q = case (p, q) of
     (Monitor {}, Then first second) -> Then first <$> shrinkProgram second
     _ -> shrinkProgram q
@@ -66,7 +66,7 @@ shrinkProgram p = parts p ++ outer ++ inner
   without xs = [take n xs ++ drop (n + 1) xs | n <- [0 .. length xs - 1]]
   simpler s =
     [s {masking = Unmasked} | masking s /= Unmasked]
-      ++ [s {whenAsked = StopsAtOnce} | whenAsked s /= StopsAtOnce]
+      ++ [s {onStop = StopsAtOnce} | onStop s /= StopsAtOnce]
       ++ [s {ends = Succeeds 0} | ends s /= Succeeds 0]
       ++ [s {takes = takes s - 1} | takes s > 1]
 

@@ -1,27 +1,27 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What signals are made of: how they are opened, and what is seen in them.
+-- The sources of signals: how they are opened, read and stopped.
 module Semantics.Source
   ( -- * Opening
     signals
-  , borrows
+  , usesShared
   , open
-  , made
-  , startedAt
+  , unstarted
+  , startSource
   , viewOf
 
-    -- * Looking
-  , look
-  , readingOf
+    -- * Reading
+  , readSource
+  , oldestReading
 
-    -- * Being asked to stop
-  , askSource
-  , rested
-  , lostOf
-  , faultsOf
+    -- * Stopping
+  , requestStopOfSource
+  , allStopped
+  , deadPollers
+  , pollerFaults
   , remaining
-  , nothing
+  , noSource
   ) where
 
 import Data.List (findIndex)
@@ -45,24 +45,24 @@ signals = \case
   WithShared s _ -> [s]
   _ -> []
 
--- | Whether a signal is made of a shared one.
-borrows :: Signal -> Bool
-borrows = \case
+-- | Whether a signal uses a shared one.
+usesShared :: Signal -> Bool
+usesShared = \case
   Shared -> True
   Watched _ -> False
   Polled _ _ -> False
-  And a b -> borrows a || borrows b
-  Hysteresis _ _ _ s -> borrows s
-  Debounce _ s -> borrows s
-  StaleAfter _ s -> borrows s
+  And a b -> usesShared a || usesShared b
+  Hysteresis _ _ _ s -> usesShared s
+  Debounce _ s -> usesShared s
+  StaleAfter _ s -> usesShared s
 
--- | Opens a signal, and starts what must run for it.
+-- | Opens a signal, and starts the threads that it needs.
 open :: Now -> Signal -> Source
-open t = startedAt t . made
+open t = startSource t . unstarted
 
--- | A source for which nothing runs yet.
-made :: Signal -> Source
-made = \case
+-- | A source whose threads have not been started.
+unstarted :: Signal -> Source
+unstarted = \case
   Watched condition -> Watching condition
   Polled every act ->
     Polling
@@ -72,196 +72,196 @@ made = \case
         , slot = 0
         , readings = 0
         , newest = Nothing
-        , underWay = Nothing
-        , asked = Heard
-        , poll = Rested (Stopped Nothing)
+        , inFlightSince = Nothing
+        , pollerRequest = Received
+        , poll = PollEnded (Stopped Nothing)
         }
-  And a b -> Joined AllHold [made a, made b]
-  Hysteresis initially l h s -> Remembering Memory {low = l, high = h, isHigh = initially, reminder = resting} (made s)
+  And a b -> Joined AllHold [unstarted a, unstarted b]
+  Hysteresis initially l h s -> WithHysteresis HysteresisState {low = l, high = h, isHigh = initially, hysteresisWorker = resting} (unstarted s)
   Debounce n s ->
-    Settling
+    Debounced
       Debouncer
         { delay = n
         , settled = Nothing
         , pending = Nothing
-        , noticer = resting
-        , noticing = Noted Nothing
-        , timer = Heard
-        , timing = Nothing
+        , changeWorker = resting
+        , changeTracking = Tracked Nothing
+        , timer = Received
+        , timedChange = Nothing
         }
-      (made s)
-  StaleAfter n s -> Guarding Watchdog {limit = n, overdue = 0, guard = Heard, guarding = Free} (made s)
-  Shared -> Borrowed
+      (unstarted s)
+  StaleAfter n s -> WithWatchdog Watchdog {limit = n, overdue = 0, watchdogRequest = Received, watchdogState = NoReading} (unstarted s)
+  Shared -> SharedSource
  where
-  resting = Worker {request = Heard, view = Always}
+  resting = Worker {request = Received, view = Always}
 
--- | Starts what must run for a source, anew perhaps. Of what went before, a hysteresis
--- remembers whether it was high, and a poller when the next reading is due.
-startedAt :: Now -> Source -> Source
-startedAt t = \case
+-- | Starts the threads of a source, for the first time or again. When restarted, a hysteresis
+-- keeps whether it was high, and a poller keeps the time at which its next reading is due.
+startSource :: Now -> Source -> Source
+startSource t = \case
   Polling s ->
-    Polling s {newest = Nothing, underWay = Nothing, asked = Unasked, poll = Sleeping (max (clock t) (slot s))}
-  Joined how sources -> Joined how (map (startedAt t) sources)
-  Remembering m source -> Remembering m {reminder = looksAt inner} inner
+    Polling s {newest = Nothing, inFlightSince = Nothing, pollerRequest = NoRequest, poll = Sleeping (max (clock t) (slot s))}
+  Joined how sources -> Joined how (map (startSource t) sources)
+  WithHysteresis m source -> WithHysteresis m {hysteresisWorker = workerFor inner} inner
    where
-    inner = startedAt t source
-  Settling d source -> Settling fresh inner
+    inner = startSource t source
+  Debounced d source -> Debounced fresh inner
    where
-    inner = startedAt t source
+    inner = startSource t source
     fresh =
       d
         { settled = Nothing
         , pending = Nothing
-        , noticer = looksAt inner
-        , noticing = Noted Nothing
-        , timer = Unasked
-        , timing = Nothing
+        , changeWorker = workerFor inner
+        , changeTracking = Tracked Nothing
+        , timer = NoRequest
+        , timedChange = Nothing
         }
-  Guarding w source -> Guarding (calmed w) {guard = Unasked, guarding = Free} (startedAt t source)
+  WithWatchdog w source -> WithWatchdog (notOverdue w) {watchdogRequest = NoRequest, watchdogState = NoReading} (startSource t source)
   other -> other
  where
-  looksAt inner = Worker {request = Unasked, view = viewOf t inner}
-  calmed w = w {overdue = overdue w + overdue w `mod` 2}
+  workerFor inner = Worker {request = NoRequest, view = viewOf t inner}
+  notOverdue w = w {overdue = overdue w + overdue w `mod` 2}
 
--- | A view of the values that are read from now on.
+-- | A view that accepts only readings that start from now on.
 viewOf :: Now -> Source -> View
 viewOf t = \case
   Polling s -> After (readings s) Always
   Joined _ sources -> Each (map (viewOf t) sources)
-  Remembering _ source -> viewOf t source
-  Settling _ source -> viewOf t source
-  Guarding w source -> After (overdue w) (viewOf t source)
-  Borrowed | s : outer <- shared t -> viewOf t {shared = outer} s
+  WithHysteresis _ source -> viewOf t source
+  Debounced _ source -> viewOf t source
+  WithWatchdog w source -> After (overdue w) (viewOf t source)
+  SharedSource | s : outer <- shared t -> viewOf t {shared = outer} s
   _ -> Always
 
--- * Looking
+-- * Reading
 
--- | A look at a source, from left to right, and what becomes of the source by it: if who
--- looks acts on it, then a hysteresis remembers what was seen. Nothing: there is no value
--- yet.
-look :: Now -> Moment -> View -> Source -> Maybe (Either Result (Int, Now, Source))
-look t moment v source = case (source, v) of
-  (Watching condition, _) -> case (Map.lookup condition (levels t), moment) of
-    (Just (At n), _) -> sees n
+-- | Reads a source, from left to right. Gives the value, and the source after the reading: if
+-- the reader acts on the value, a hysteresis keeps the new state. 'Nothing': there is no
+-- value yet.
+readSource :: Now -> ReadMode -> View -> Source -> Maybe (Either Result (Int, Now, Source))
+readSource t mode v source = case (source, v) of
+  (Watching condition, _) -> case (Map.lookup condition (levels t), mode) of
+    (Just (At n), _) -> gives n
     (Just Failing, _) -> wrong (Failed condition)
     (Just Faulting, _) -> wrong (Faulted condition)
-    (_, First) -> Nothing
-    (_, Later) -> wrong (Failed noValue)
-  (Deadline end, _) -> sees (fromEnum (clock t >= end))
+    (_, FirstRead) -> Nothing
+    (_, Reread) -> wrong (Failed noValue)
+  (Deadline end, _) -> gives (fromEnum (clock t >= end))
   (Polling s, After n _) -> case newest s of
     Just (k, result) | k > n -> case result of
-      Succeeded value -> sees (number value)
+      Succeeded value -> gives (number value)
       other -> wrong other
     _ -> Nothing
   (Joined how sources, Each views) -> joined how [] t (zip views sources)
-  (Remembering m inner, _) -> inside v inner $ \n t' inner' ->
+  (WithHysteresis m inner, _) -> inside v inner $ \n t' inner' ->
     let after = n >= high m || (isHigh m && n > low m)
-     in found (fromEnum after) t' (Remembering m {isHigh = after} inner')
-  (Settling d inner, _) -> inside v inner $ \_ t' inner' ->
-    settled d >>= \n -> found n t' (Settling d inner')
-  (Guarding w inner, After n v')
+     in found (fromEnum after) t' (WithHysteresis m {isHigh = after} inner')
+  (Debounced d inner, _) -> inside v inner $ \_ t' inner' ->
+    settled d >>= \n -> found n t' (Debounced d inner')
+  (WithWatchdog w inner, After n v')
     | odd (overdue w) || overdue w > n -> wrong (Failed (overdueBy (limit w)))
-    | otherwise -> inside v' inner $ \m t' inner' -> found m t' (Guarding w inner')
-  -- What it is made of may have died: then it fails, whatever its value.
-  (Borrowed, _) | s : outer <- shared t -> case lostOf s of
+    | otherwise -> inside v' inner $ \m t' inner' -> found m t' (WithWatchdog w inner')
+  -- If a poller of the shared source has died, the reading fails, whatever the value is.
+  (SharedSource, _) | s : outer <- shared t -> case deadPollers s of
     dead : _ -> wrong dead
-    [] -> seeing t {shared = outer} v s $ \n t' s' -> found n t' {shared = s' : shared t'} Borrowed
+    [] -> readInner t {shared = outer} v s $ \n t' s' -> found n t' {shared = s' : shared t'} SharedSource
   _ -> Nothing
  where
-  sees n = found n t source
+  gives n = found n t source
   found n t' source' = Just (Right (n, t', source'))
   wrong = Just . Left
-  inside = seeing t
-  seeing t' v' s next =
-    look t' moment v' s >>= \case
+  inside = readInner t
+  readInner t' v' s next =
+    readSource t' mode v' s >>= \case
       Left why -> wrong why
       Right (n, t'', s') -> next n t'' s'
   joined how done t' = \case
     [] -> found (join how (map fst values)) t' (Joined how (map snd values))
      where
       values = reverse done
-    (v', s) : others -> seeing t' v' s $ \n t'' s' -> joined how ((n, s') : done) t'' others
+    (v', s) : others -> readInner t' v' s $ \n t'' s' -> joined how ((n, s') : done) t'' others
   join = \case
     AllHold -> fromEnum . all holds
     FirstHolding -> fromMaybe (-1) . findIndex holds
 
--- | When the oldest reading began that is under way.
-readingOf :: Now -> Source -> Maybe Ticks
-readingOf t = \case
-  Polling s -> underWay s
-  Joined _ sources -> case mapMaybe (readingOf t) sources of
+-- | When the oldest of the readings in flight began.
+oldestReading :: Now -> Source -> Maybe Ticks
+oldestReading t = \case
+  Polling s -> inFlightSince s
+  Joined _ sources -> case mapMaybe (oldestReading t) sources of
     [] -> Nothing
     since -> Just (minimum since)
-  Remembering _ source -> readingOf t source
-  Settling _ source -> readingOf t source
-  Guarding _ source -> readingOf t source
-  Borrowed | s : outer <- shared t -> readingOf t {shared = outer} s
+  WithHysteresis _ source -> oldestReading t source
+  Debounced _ source -> oldestReading t source
+  WithWatchdog _ source -> oldestReading t source
+  SharedSource | s : outer <- shared t -> oldestReading t {shared = outer} s
   _ -> Nothing
 
--- * Being asked to stop
+-- * Stopping
 
--- | Asks all that runs for a source.
-askSource :: Source -> Source
-askSource = \case
-  Polling s -> Polling s {asked = ask' (asked s)}
-  Joined how sources -> Joined how (map askSource sources)
-  Remembering m source -> Remembering m {reminder = askWorker (reminder m)} (askSource source)
-  Settling d source -> Settling d {noticer = askWorker (noticer d), timer = ask' (timer d)} (askSource source)
-  Guarding w source -> Guarding w {guard = ask' (guard w)} (askSource source)
+-- | Requests the stop of all threads of a source.
+requestStopOfSource :: Source -> Source
+requestStopOfSource = \case
+  Polling s -> Polling s {pollerRequest = requestStop' (pollerRequest s)}
+  Joined how sources -> Joined how (map requestStopOfSource sources)
+  WithHysteresis m source -> WithHysteresis m {hysteresisWorker = requestStopOfWorker (hysteresisWorker m)} (requestStopOfSource source)
+  Debounced d source -> Debounced d {changeWorker = requestStopOfWorker (changeWorker d), timer = requestStop' (timer d)} (requestStopOfSource source)
+  WithWatchdog w source -> WithWatchdog w {watchdogRequest = requestStop' (watchdogRequest w)} (requestStopOfSource source)
   other -> other
  where
-  askWorker w = w {request = ask' (request w)}
-  ask' = \case
-    Unasked -> Asked
+  requestStopOfWorker w = w {request = requestStop' (request w)}
+  requestStop' = \case
+    NoRequest -> Requested
     other -> other
 
--- | Whether all that ran for a source has ended.
-rested :: Source -> Bool
-rested = \case
-  Polling Poller {poll = Rested _} -> True
+-- | Whether all threads of a source have ended.
+allStopped :: Source -> Bool
+allStopped = \case
+  Polling Poller {poll = PollEnded _} -> True
   Polling _ -> False
-  Joined _ sources -> all rested sources
-  Remembering m source -> request (reminder m) == Heard && rested source
-  Settling d source -> request (noticer d) == Heard && timer d == Heard && rested source
-  Guarding w source -> guard w == Heard && rested source
+  Joined _ sources -> all allStopped sources
+  WithHysteresis m source -> request (hysteresisWorker m) == Received && allStopped source
+  Debounced d source -> request (changeWorker d) == Received && timer d == Received && allStopped source
+  WithWatchdog w source -> watchdogRequest w == Received && allStopped source
   _ -> True
 
 -- | How the pollers of a source have ended, from left to right.
-endsOf :: Source -> [Result]
-endsOf = \case
-  Polling Poller {poll = Rested result} -> [result]
-  Joined _ sources -> concatMap endsOf sources
-  Remembering _ source -> endsOf source
-  Settling _ source -> endsOf source
-  Guarding _ source -> endsOf source
+pollerEnds :: Source -> [Result]
+pollerEnds = \case
+  Polling Poller {poll = PollEnded result} -> [result]
+  Joined _ sources -> concatMap pollerEnds sources
+  WithHysteresis _ source -> pollerEnds source
+  Debounced _ source -> pollerEnds source
+  WithWatchdog _ source -> pollerEnds source
   _ -> []
 
--- | What they died of.
-lostOf :: Source -> [Result]
-lostOf = filter isLost . endsOf
+-- | The failures and faults with which pollers of a source have ended.
+deadPollers :: Source -> [Result]
+deadPollers = filter isDead . pollerEnds
  where
-  isLost = \case
+  isDead = \case
     Failed _ -> True
     Faulted _ -> True
     _ -> False
 
-faultsOf :: Source -> [String]
-faultsOf source = [fault | Faulted fault <- endsOf source]
+pollerFaults :: Source -> [String]
+pollerFaults source = [fault | Faulted fault <- pollerEnds source]
 
--- | What there is to wait for in a source that was asked to stop, and at which nobody
--- looks any more. (What looks at others stops at once.)
+-- | The part of a source that must still be awaited after its stop was requested, when it is
+-- not read any more: its pollers. (The threads of filters stop at once.)
 remaining :: Source -> Source
 remaining = Joined AllHold . pollers
  where
   pollers = \case
-    s@(Polling Poller {poll = Rested (Faulted _)}) -> [s]
-    Polling Poller {poll = Rested _} -> []
+    s@(Polling Poller {poll = PollEnded (Faulted _)}) -> [s]
+    Polling Poller {poll = PollEnded _} -> []
     s@(Polling _) -> [s]
     Joined _ sources -> concatMap pollers sources
-    Remembering _ source -> pollers source
-    Settling _ source -> pollers source
-    Guarding _ source -> pollers source
+    WithHysteresis _ source -> pollers source
+    Debounced _ source -> pollers source
+    WithWatchdog _ source -> pollers source
     _ -> []
 
-nothing :: Source
-nothing = Joined AllHold []
+noSource :: Source
+noSource = Joined AllHold []

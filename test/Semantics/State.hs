@@ -9,19 +9,19 @@ module Semantics.State
   , Running (..)
   , Operator (..)
   , Thread (..)
-  , Life (..)
+  , ThreadState (..)
   , Phase (..)
-  , Moment (..)
+  , ReadMode (..)
   , Reaction (..)
 
-    -- * What a signal is made of
+    -- * The sources of a signal
   , Source (..)
   , Poller (..)
   , Poll (..)
   , module Semantics.Filter
 
     -- * Threads
-  , ask
+  , requestStop
   , asOutcome
   , endOf
   , over
@@ -30,8 +30,8 @@ module Semantics.State
   , threadsOf
 
     -- * Time
-  , moments
-  , afterwards
+  , dueTimes
+  , afterTimePassed
   ) where
 
 import Data.Map.Strict (Map)
@@ -47,62 +47,66 @@ data State = State
   }
   deriving (Eq, Ord, Show)
 
--- | What all that runs has in common.
+-- | The part of the state that all threads share.
 data Now = Now
   { clock :: Ticks
   , levels :: Map Condition Level
   , calls :: Map Name Int
-  -- ^ How often an action was called; those to come all follow the last script.
+  -- ^ How often each action was called, counted up to its last script, which repeats.
   , shared :: [Source]
-  -- ^ Those that are shared around the part which takes a step, the nearest first.
-  , answers :: Map Int (Maybe Result)
-  -- ^ How the children have ended for which somebody waits, or will.
-  , retracted :: Set Int
-  -- ^ Those of them that are to be stopped, which their nursery has yet to find.
+  -- ^ The sources of the 'WithShared' operators around the part that takes a step, the
+  -- innermost first.
+  , childResults :: Map Int (Maybe Result)
+  -- ^ The results of the forked children that are awaited, or will be; 'Nothing' until the
+  -- child has ended.
+  , childStopRequests :: Set Int
+  -- ^ The children whose stop was requested by their handle, and not yet passed on by their
+  -- nursery.
   }
   deriving (Eq, Ord, Show)
 
--- | How far a thread has come.
+-- | What remains of a program that runs in a thread.
 data Running
-  = -- | It has not begun.
+  = -- | The program has not begun.
     Starting Program
-  | -- | It is about to look at what is shared.
+  | -- | An operator is about to open a signal that uses a shared one.
     Opening Program
-  | -- | It is about to call an action.
+  | -- | An action is about to be called.
     Calling Name [Script]
-  | -- | The action does what it does until that moment.
+  | -- | The action works until the given time.
     Acting Name Ticks Script
-  | -- | It was asked to stop, and is busy with that until that moment. (Nothing: then it
-    -- has stopped.)
+  | -- | The action has received a stop request, and its cleanup lasts until the given time.
+    -- Then it ends as given ('Nothing': it stops).
     Cleaning Name Ticks (Maybe Ending)
-  | -- | Likewise, but it can hear another request.
-    Tidying Name Ticks
+  | -- | A cleanup until the given time, which another stop request interrupts.
+    CleaningInterruptibly Name Ticks
   | Running `AndThen` Program
   | Running `OrElse` Program
   | -- | The operator waits for its branches.
-    Looking Operator [Thread]
+    Waiting Operator [Thread]
   | -- | The operator follows its signal.
     Reacting Program Source View Phase
-  | -- | The source is there for as long as the body runs.
+  | -- | The source runs for as long as the body does.
     Sharing Source Thread
-  | -- | The operator has come to a verdict, and waits for those whom it has asked to stop.
+  | -- | The operator has its verdict, and waits for the threads whose stop it has requested.
     Concluding Operator Result Source [Thread]
-  | -- | It is about to fork the one. If it then waits for the result, it runs the other
-    -- before; and it is said whether the one is asked to stop then.
+  | -- | The first program is about to be forked. If its result is awaited, the other program
+    -- runs before that; the 'Bool' is whether the child's stop is requested in between.
     Forking Program (Maybe (Bool, Program))
-  | -- | What it forks has started.
+  | -- | The child has started. (The arguments are the child's number, and those of 'Forking'.)
     Forked (Maybe (Int, Bool, Program))
-  | -- | When this is over, it asks that child to stop, and then waits for it.
-    Retracting Int Running
-  | -- | When this is over, it waits for that child.
-    Obtaining Int Running
-  | -- | It is that child.
-    Answering Int Running
-  | -- | The environment, with the changes to come.
+  | -- | After this, the stop of the child with that number is requested, and the child awaited.
+    StoppingChild Int Running
+  | -- | After this, the child with that number is awaited.
+    AwaitingChild Int Running
+  | -- | The child with that number, whose result is awaited.
+    AsChild Int Running
+  | -- | The environment, with the changes to come and the time at which it ends.
     Changing [Change] Ticks
-  | -- | The program of a stranger, who asks it to stop at those times.
+  | -- | A program that a plain thread runs, with the changes to come and the times at which
+    -- an exception is thrown to that thread.
     Called Request Running [Change] [Ticks]
-  | -- | It has done all that it does, and can still be stopped.
+  | -- | The work is done, and a stop request can still arrive.
     Returning Result
   | Over Result
   deriving (Eq, Ord, Show)
@@ -116,40 +120,40 @@ data Operator
   deriving (Eq, Ord, Show)
 
 -- | A branch of an operator.
-data Thread = Thread Label Life
+data Thread = Thread Label ThreadState
   deriving (Eq, Ord, Show)
 
-data Life
-  = Living Request Running
-  | -- | It has ended, but that is not yet known.
+data ThreadState
+  = Live Request Running
+  | -- | It has ended, but its result is not yet published.
     Finished Result
-  | -- | Likewise, and it is the child of this number.
+  | -- | Likewise, for the child with that number.
     FinishedChild Int Result
   | Ended Result
   deriving (Eq, Ord, Show)
 
--- | Where a reactive operator is.
+-- | The phase of a reactive operator.
 data Phase
-  = -- | Nothing runs: what the signal says now decides.
-    Choosing Moment
-  | -- | The reaction to this value is to wait for another.
+  = -- | No branch runs: the signal's current value decides what comes next.
+    Choosing ReadMode
+  | -- | The reaction to this value is to wait for a different one.
     Idling Int
   | -- | The branch for this value runs.
     Following Int Thread
-  | -- | The branch was asked to stop, so that this can come next.
-    Preempting Reaction Thread
-  | -- | The recovery runs, and nothing else matters. Before it, perhaps, a branch ended
-    -- wrongly.
+  | -- | The branch's stop was requested; this reaction comes next.
+    Stopping Reaction Thread
+  | -- | The recovery runs, and the signal is not read. The first thread is the branch that was
+    -- stopped for it, if that failed or faulted.
     Recovering (Maybe Thread) Thread
-  | -- | The recovery has ended; the sensors have to before they start afresh.
-    Resting
-  | -- | They are about to.
-    Beginning
+  | -- | The recovery has ended. The sensors must have ended, too, before they are restarted.
+    AwaitingSensors
+  | -- | The sensors are about to be restarted.
+    Restarting
   deriving (Eq, Ord, Show)
 
-data Moment
-  = First
-  | Later
+data ReadMode
+  = FirstRead
+  | Reread
   deriving (Eq, Ord, Show)
 
 data Reaction
@@ -159,31 +163,31 @@ data Reaction
   | Conclude Result
   deriving (Eq, Ord, Show)
 
--- | What a signal is made of, for one run of an operator.
+-- | What runs for a signal during one run of an operator.
 data Source
   = Watching Condition
   | Deadline Ticks
   | Polling Poller
   | Joined Join [Source]
-  | Remembering Memory Source
-  | Settling Debouncer Source
-  | Guarding Watchdog Source
-  | -- | The nearest of those that are 'shared'.
-    Borrowed
+  | WithHysteresis HysteresisState Source
+  | Debounced Debouncer Source
+  | WithWatchdog Watchdog Source
+  | -- | The innermost of the 'shared' sources.
+    SharedSource
   deriving (Eq, Ord, Show)
 
 data Poller = Poller
   { period :: Ticks
   , sensor :: Program
   , slot :: Ticks
-  -- ^ No reading starts before.
+  -- ^ No reading starts before this time.
   , readings :: Int
-  -- ^ How many were started.
+  -- ^ How many readings were started.
   , newest :: Maybe (Int, Result)
-  -- ^ Which of them, and what it was.
-  , underWay :: Maybe Ticks
-  -- ^ Since when.
-  , asked :: Request
+  -- ^ The number of the newest published reading, and its result.
+  , inFlightSince :: Maybe Ticks
+  -- ^ When the reading that runs now was started.
+  , pollerRequest :: Request
   , poll :: Poll
   }
   deriving (Eq, Ord, Show)
@@ -191,28 +195,29 @@ data Poller = Poller
 data Poll
   = Sleeping Ticks
   | Reading Running
-  | -- | It is there, but not yet known.
-    Read Result
-  | -- | Likewise of the end.
-    Leaving Result
-  | Rested Result
+  | -- | The reading has ended, and is not yet published.
+    Unpublished Result
+  | -- | The poller ends with this, which is not yet published.
+    EndingWith Result
+  | PollEnded Result
   deriving (Eq, Ord, Show)
 
 -- * Threads
 
--- | To ask one that was asked before, or has ended, changes nothing.
-ask :: Thread -> Thread
-ask = \case
-  Thread label (Living asks r) | asks `elem` [Unborn, Unasked] -> Thread label (Living Asked r)
+-- | Requests a thread's stop. This has no effect after an earlier request or after its end.
+requestStop :: Thread -> Thread
+requestStop = \case
+  Thread label (Live requests r) | requests `elem` [NotStarted, NoRequest] -> Thread label (Live Requested r)
   other -> other
 
--- | Whoever asked for the stop takes out the fault that was met on the way.
+-- | The result of a branch for the operator that has requested its stop: a fault met while
+-- stopping is a fault.
 asOutcome :: Result -> Result
 asOutcome = \case
   Stopped (Just fault) -> Faulted fault
   other -> other
 
--- | How a thread ended, if that is known.
+-- | How a thread ended, if that is published.
 endOf :: Thread -> Maybe Result
 endOf = \case
   Thread _ (Ended result) -> Just result
@@ -230,77 +235,77 @@ faultOf thread' = [fault | Just (Faulted fault) <- [endOf thread']]
 threadsOf :: Phase -> [Thread]
 threadsOf = \case
   Following _ branch -> [branch]
-  Preempting _ branch -> [branch]
+  Stopping _ branch -> [branch]
   Recovering before recovery -> maybe id (:) before [recovery]
   _ -> []
 
 -- * Time
 
--- | The moments at which something is due.
-moments :: Running -> [Ticks]
-moments = \case
+-- | The times at which something is due.
+dueTimes :: Running -> [Ticks]
+dueTimes = \case
   Acting _ until' _ -> [until']
   Cleaning _ until' _ -> [until']
-  Tidying _ until' -> [until']
-  first `AndThen` _ -> moments first
-  first `OrElse` _ -> moments first
-  Retracting _ r -> moments r
-  Obtaining _ r -> moments r
-  Answering _ r -> moments r
-  Looking _ threads -> ofThreads threads
+  CleaningInterruptibly _ until' -> [until']
+  first `AndThen` _ -> dueTimes first
+  first `OrElse` _ -> dueTimes first
+  StoppingChild _ r -> dueTimes r
+  AwaitingChild _ r -> dueTimes r
+  AsChild _ r -> dueTimes r
+  Waiting _ threads -> ofThreads threads
   Reacting _ source _ phase -> ofSource source ++ ofThreads (threadsOf phase)
   Sharing source body -> ofSource source ++ ofThreads [body]
   Concluding _ _ source threads -> ofSource source ++ ofThreads threads
   Changing (Change at _ _ : _) _ -> [at]
   Changing [] end -> [end]
-  Called _ r (Change at _ _ : _) _ -> at : moments r
-  Called _ r [] asking -> take 1 asking ++ moments r
+  Called _ r (Change at _ _ : _) _ -> at : dueTimes r
+  Called _ r [] stopTimes -> take 1 stopTimes ++ dueTimes r
   _ -> []
  where
-  ofThreads threads = concat [moments r | Thread _ (Living _ r) <- threads]
+  ofThreads threads = concat [dueTimes r | Thread _ (Live _ r) <- threads]
   ofSource = \case
     Deadline end -> [end]
     Polling Poller {poll = Sleeping until'} -> [until']
-    Polling Poller {poll = Reading r} -> moments r
+    Polling Poller {poll = Reading r} -> dueTimes r
     Joined _ sources -> concatMap ofSource sources
-    Remembering _ source -> ofSource source
-    Settling d source -> [since + delay d | Just (_, since) <- [timing d]] ++ ofSource source
-    Guarding w source -> [since + limit w | Due since <- [guarding w]] ++ ofSource source
+    WithHysteresis _ source -> ofSource source
+    Debounced d source -> [since + delay d | Just (_, since) <- [timedChange d]] ++ ofSource source
+    WithWatchdog w source -> [since + limit w | InFlight since <- [watchdogState w]] ++ ofSource source
     _ -> []
 
--- | What time does to all that runs: by now all has been started, and every request has come
--- to where it is to be heard.
-afterwards :: Running -> Running
-afterwards = \case
-  first `AndThen` second -> afterwards first `AndThen` second
-  first `OrElse` second -> afterwards first `OrElse` second
-  Obtaining k r -> Obtaining k (afterwards r)
-  Answering k r -> Answering k (afterwards r)
-  Looking operator threads -> Looking operator (map ofThread threads)
+-- | The effect of the passing of time: all threads have started, and every stop request has
+-- reached its thread, where it is pending if it cannot be received.
+afterTimePassed :: Running -> Running
+afterTimePassed = \case
+  first `AndThen` second -> afterTimePassed first `AndThen` second
+  first `OrElse` second -> afterTimePassed first `OrElse` second
+  AwaitingChild k r -> AwaitingChild k (afterTimePassed r)
+  AsChild k r -> AsChild k (afterTimePassed r)
+  Waiting operator threads -> Waiting operator (map ofThread threads)
   Reacting p source v phase -> Reacting p (ofSource source) v (ofPhase phase)
   Sharing source body -> Sharing (ofSource source) (ofThread body)
   Concluding operator result source threads -> Concluding operator result (ofSource source) (map ofThread threads)
-  Called asks r coming asking -> Called (ofRequest asks) (afterwards r) coming asking
+  Called requests r coming stopTimes -> Called (ofRequest requests) (afterTimePassed r) coming stopTimes
   r -> r
  where
   ofThread = \case
-    Thread label (Living asks r) -> Thread label (Living (ofRequest asks) (afterwards r))
+    Thread label (Live requests r) -> Thread label (Live (ofRequest requests) (afterTimePassed r))
     other -> other
   ofPhase = \case
     Following value branch -> Following value (ofThread branch)
-    Preempting next branch -> Preempting next (ofThread branch)
+    Stopping next branch -> Stopping next (ofThread branch)
     Recovering before recovery -> Recovering (ofThread <$> before) (ofThread recovery)
     phase -> phase
   ofSource = \case
-    Polling s@Poller {poll = Reading r} -> Polling s {poll = Reading (afterwards r)}
+    Polling s@Poller {poll = Reading r} -> Polling s {poll = Reading (afterTimePassed r)}
     Joined how sources -> Joined how (map ofSource sources)
-    Remembering m source -> Remembering m (ofSource source)
-    Settling d source -> Settling d (ofSource source)
-    Guarding w source -> Guarding w (ofSource source)
+    WithHysteresis m source -> WithHysteresis m (ofSource source)
+    Debounced d source -> Debounced d (ofSource source)
+    WithWatchdog w source -> WithWatchdog w (ofSource source)
     source -> source
   ofRequest = \case
-    Unborn -> Unasked
-    Asked -> Pending
-    AskedTwice -> PendingTwice
-    PendingAndAsked -> PendingTwice
-    asks -> asks
+    NotStarted -> NoRequest
+    Requested -> Pending
+    RequestedTwice -> PendingTwice
+    PendingAndRequested -> PendingTwice
+    requests -> requests

@@ -3,14 +3,14 @@
 -- |
 -- The meaning of the language, as a small-step relation.
 --
--- A state is a clock, what the conditions are at, and how far the program has come.
--- The rules say what may happen next; where several may, any of them does. Time
--- passes only when nothing else can happen.
+-- A state consists of a clock, the levels of the conditions, and what remains of the
+-- program. The rules define the steps that are possible; where there are several, any of
+-- them may be taken. Time passes only when no step is possible.
 --
--- What runs side by side takes its steps in any order. In particular a branch that
--- has ended is not seen by its operator at once, a branch that was asked to stop
--- does not hear it at once, and in between others take their steps: all this is
--- \"the same instant\" and is where ties come from.
+-- Concurrent threads take their steps in any order. In particular there can be steps of
+-- other threads between the end of a branch and the moment when its operator reads it, and
+-- between a stop request and its receipt. All of them are in the same instant, which is
+-- why ties are possible.
 module Semantics.Step
   ( step
   , pass
@@ -26,18 +26,18 @@ import Semantics.Source
 import Semantics.State
 import Semantics.Verdict
 
--- | What may happen next.
+-- | The possible steps, each with its transition.
 step :: State -> [(Transition, State)]
-step (State r t) = [(event, State r' t') | (Happens event, t', r') <- steps t r]
+step (State r t) = [(transition, State r' t') | (Emits transition, t', r') <- steps t r]
 
--- | Time passes, up to the next moment at which something can happen; or to a later one, as
--- long as that makes nothing late by the given number of ticks. Only for states in which
--- nothing else can happen.
+-- | Time passes, up to the next time at which something is due; or to a later one, as long
+-- as nothing gets late by the given number of ticks. Only for states in which no step is
+-- possible.
 pass :: Ticks -> State -> [State]
-pass slip (State r t) = case filter (> clock t) (moments r) of
+pass slip (State r t) = case filter (> clock t) (dueTimes r) of
   [] -> []
   coming ->
-    [ State (afterwards r) t {clock = at}
+    [ State (afterTimePassed r) t {clock = at}
     | let next = minimum coming
     , at <- Set.toList (Set.fromList coming)
     , at == next || at < next + slip
@@ -52,71 +52,71 @@ steps t = \case
         called
           | n + 1 < length scripts = t {calls = Map.insert name (n + 1) (calls t)}
           | otherwise = t
-     in [(Happens (name `Does` Begins), called, Acting name (clock t + takes script) script)]
+     in [(Emits (Action name Begins), called, Acting name (clock t + takes script) script)]
   Acting name until' script ->
-    [(Happens (name `Does` Ends (ends script)), t, Over (ended name (ends script))) | clock t >= until']
+    [(Emits (Action name (Ends (ends script))), t, Over (ended name (ends script))) | clock t >= until']
   Cleaning name until' how ->
-    [ (Happens (name `Does` maybe Stops Ends how), t, Over (maybe (Stopped Nothing) (ended (cleanupOf name)) how))
+    [ (Emits (Action name (maybe Stops Ends how)), t, Over (maybe (Stopped Nothing) (ended (cleanupOf name)) how))
     | clock t >= until'
     ]
-  Tidying name until' -> [(Happens (name `Does` Stops), t, Over (Stopped Nothing)) | clock t >= until']
+  CleaningInterruptibly name until' -> [(Emits (Action name Stops), t, Over (Stopped Nothing)) | clock t >= until']
   first `AndThen` second -> [(l, t', andThen t' r second) | (l, t', r) <- steps t first]
   first `OrElse` second -> [(l, t', orElse t' r second) | (l, t', r) <- steps t first]
-  Looking operator threads ->
+  Waiting operator threads ->
     case verdict operator threads of
-      Just result -> silently t (conclude operator result nothing threads)
+      Just result -> silently t (conclude operator result noSource threads)
       Nothing -> []
       ++ concatMap (serve operator) (oneOf (threadSteps t) threads)
-      ++ (if operator == Nursery then retract threads else [])
-  -- A reading that begins before it looks does not count.
+      ++ (if operator == Nursery then stopRequestedChildren threads else [])
+  -- Readings that began before this step do not count.
   Opening p -> silently t (opened t p)
   Reacting p source v phase ->
-    [(l, t', reacting t' p source' v phase) | (l, t', source') <- sourceSteps steps hear t source]
+    [(l, t', afterSensorStep t' p source' v phase) | (l, t', source') <- sourceSteps steps receive t source]
       ++ reactions t p source v phase
   Sharing source body ->
     case verdict Share [body] of
       Just result -> silently t (conclude Share result source [body])
       Nothing -> []
-      ++ [(l, t', Sharing source' body) | (l, t', source') <- sourceSteps steps hear t source]
-      ++ [(l, t', Sharing source' body') | (l, t', (source', body')) <- lending source (`threadSteps` body)]
+      ++ [(l, t', Sharing source' body) | (l, t', source') <- sourceSteps steps receive t source]
+      ++ [(l, t', Sharing source' body') | (l, t', (source', body')) <- withSharedSource source (`threadSteps` body)]
   Concluding operator result source threads
-    | rested source, all over threads -> silently t (Over (outcome operator result source threads))
+    | allStopped source, all over threads -> silently t (Over (outcome operator result source threads))
     | otherwise ->
-        [(l, t', concluding operator result source' threads) | (l, t', source') <- sourceSteps steps hear t source]
+        [(l, t', concluding operator result source' threads) | (l, t', source') <- sourceSteps steps receive t source]
           ++ [ (l', t', concluding operator result source' threads')
              | (l, t', (source', threads')) <- branches
              , l' <- if operator == Nursery then refuse l else [l]
              ]
    where
     branches
-      | operator == Share = lending source (\t' -> oneOf (threadSteps t') threads)
+      | operator == Share = withSharedSource source (\t' -> oneOf (threadSteps t') threads)
       | otherwise = [(l, t', (source, threads')) | (l, t', threads') <- oneOf (threadSteps t) threads]
   Forking p wanted ->
     (Refused, t, Over (Failed tooLate)) : case wanted of
       Nothing -> [(Forks Nothing p, t, Forked Nothing)]
       Just (stops, meanwhile) ->
-        let k = length (takeWhile id (zipWith (==) [0 ..] (Map.keys (answers t))))
-         in [(Forks (Just k) p, t {answers = Map.insert k Nothing (answers t)}, Forked (Just (k, stops, meanwhile)))]
+        let k = length (takeWhile id (zipWith (==) [0 ..] (Map.keys (childResults t))))
+         in [(Forks (Just k) p, t {childResults = Map.insert k Nothing (childResults t)}, Forked (Just (k, stops, meanwhile)))]
   Forked Nothing -> silently t (Over (Succeeded Unit))
   Forked (Just (k, stops, meanwhile)) ->
-    silently t (whenSuccessful ((if stops then Retracting else Obtaining) k) (begin t meanwhile))
-  Retracting k (Over _) ->
-    silently t {retracted = Set.insert k (retracted t)} (Obtaining k (Over (Succeeded Unit)))
-  Retracting k r -> [(l, t', whenSuccessful (Retracting k) r') | (l, t', r') <- steps t r]
-  Obtaining k (Over _) -> case Map.lookup k (answers t) of
+    silently t (whenSuccessful ((if stops then StoppingChild else AwaitingChild) k) (begin t meanwhile))
+  StoppingChild k (Over _) ->
+    silently t {childStopRequests = Set.insert k (childStopRequests t)} (AwaitingChild k (Over (Succeeded Unit)))
+  StoppingChild k r -> [(l, t', whenSuccessful (StoppingChild k) r') | (l, t', r') <- steps t r]
+  AwaitingChild k (Over _) -> case Map.lookup k (childResults t) of
     Just (Just result) ->
-      silently t {answers = Map.delete k (answers t), retracted = Set.delete k (retracted t)} (Over result)
+      silently t {childResults = Map.delete k (childResults t), childStopRequests = Set.delete k (childStopRequests t)} (Over result)
     _ -> []
-  Obtaining k r -> [(l, t', whenSuccessful (Obtaining k) r') | (l, t', r') <- steps t r]
-  Answering k r -> [(l, t', Answering k r') | (l, t', r') <- steps t r]
+  AwaitingChild k r -> [(l, t', whenSuccessful (AwaitingChild k) r') | (l, t', r') <- steps t r]
+  AsChild k r -> [(l, t', AsChild k r') | (l, t', r') <- steps t r]
   Changing (Change at condition level : others) end -> changing at condition level (Changing others end)
   Changing [] end -> if clock t >= end then silently t (Over (Succeeded timeIsUp)) else []
   Called _ (Over result) [] [] -> silently t (Over result)
-  Called asks r coming asking ->
-    [(l, t', Called asks' (returning r r') coming asking) | (l, t', asks', r') <- running' t asks r]
-      ++ case (coming, asking) of
-        (Change at condition level : others, _) -> changing at condition level (Called asks r others asking)
-        ([], at : others) | clock t >= at -> silently t (Called (askedAgain asks) r [] others)
+  Called requests r coming stopTimes ->
+    [(l, t', Called requests' (returning r r') coming stopTimes) | (l, t', requests', r') <- running' t requests r]
+      ++ case (coming, stopTimes) of
+        (Change at condition level : others, _) -> changing at condition level (Called requests r others stopTimes)
+        ([], at : others) | clock t >= at -> silently t (Called (requestedAgain requests) r [] others)
         _ -> []
   Returning result -> silently t (Over result)
   Over _ -> []
@@ -124,40 +124,40 @@ steps t = \case
   returning before = \case
     Over result@(Succeeded _) | before /= Returning result -> Returning result
     r -> r
-  -- The steps of those among whom a source is shared.
-  lending source ofThose =
+  -- The steps of the threads that share the source.
+  withSharedSource source ofThose =
     [ (l, t' {shared = drop 1 (shared t')}, (source', those))
     | (l, t', those) <- ofThose t {shared = source : shared t}
     , source' <- take 1 (shared t')
     ]
   changing at condition level others =
-    [ (Happens (condition `Becomes` level), t {levels = Map.insert condition level (levels t)}, others)
+    [ (Emits (condition `Becomes` level), t {levels = Map.insert condition level (levels t)}, others)
     | clock t >= at
     ]
   serve Nursery (Forks wanted p, t', threads)
-    | Nothing <- verdict Nursery threads = silently t' (Looking Nursery (threads ++ [forked t' wanted p]))
+    | Nothing <- verdict Nursery threads = silently t' (Waiting Nursery (threads ++ [forked t' wanted p]))
     | otherwise = []
   serve Nursery (Refused, _, _) = []
-  serve Nursery (l, t', threads) = [(l, t', Looking Nursery (withoutCompleted threads))]
-  serve operator (l, t', threads) = [(l, t', Looking operator threads)]
-  -- While all is being stopped to fork fails.
+  serve Nursery (l, t', threads) = [(l, t', Waiting Nursery (withoutCompleted threads))]
+  serve operator (l, t', threads) = [(l, t', Waiting operator threads)]
+  -- A fork fails while the nursery stops its branches.
   refuse = \case
     Forks _ _ -> []
-    Refused -> [Happens Silent]
+    Refused -> [Emits Silent]
     l -> [l]
-  -- It asks a child to stop that was retracted.
-  retract threads =
-    [ (Happens Silent, t {retracted = Set.delete k (retracted t)}, Looking Nursery (map (\c -> if isChild k c then ask c else c) threads))
+  -- Requests the stop of the children whose handles have requested it.
+  stopRequestedChildren threads =
+    [ (Emits Silent, t {childStopRequests = Set.delete k (childStopRequests t)}, Waiting Nursery (map (\c -> if isChild k c then requestStop c else c) threads))
     | Nothing <- [verdict Nursery threads]
-    , k <- Set.toList (retracted t)
+    , k <- Set.toList (childStopRequests t)
     , any (isChild k) threads
     ]
   isChild k = \case
-    Thread _ (Living _ (Answering k' _)) -> k == k'
+    Thread _ (Live _ (AsChild k' _)) -> k == k'
     _ -> False
   forked t' = \case
     Nothing -> thread t' "scoped: fork"
-    Just k -> Thread "scoped: fork" . Living Unborn . Answering k . Starting
+    Just k -> Thread "scoped: fork" . Live NotStarted . AsChild k . Starting
   withoutCompleted = \case
     main : others -> main : filter (not . harmless) others
     [] -> []
@@ -166,72 +166,72 @@ steps t = \case
     Just (Stopped Nothing) -> True
     _ -> False
 
--- | What comes after it if it has not gone wrong.
+-- | Applies the function unless it has ended without success.
 whenSuccessful :: (Running -> Running) -> Running -> Running
 whenSuccessful next = \case
   Over (Succeeded value) -> next (Over (Succeeded value))
   Over wrong -> Over wrong
   r -> next r
 
--- * Being asked to stop
+-- * Stop requests
 
-askedAgain :: Request -> Request
-askedAgain = \case
-  Asked -> AskedTwice
-  Pending -> PendingAndAsked
-  _ -> Asked
+requestedAgain :: Request -> Request
+requestedAgain = \case
+  Requested -> RequestedTwice
+  Pending -> PendingAndRequested
+  _ -> Requested
 
--- | What is left to hear once a request was heard. Nothing: there is none.
-heard :: Request -> Maybe Request
-heard = \case
-  Asked -> Just Heard
-  AskedTwice -> Just Asked
-  Pending -> Just Heard
+-- | What is left to receive after one request was received. 'Nothing': there is no request.
+afterReceiving :: Request -> Maybe Request
+afterReceiving = \case
+  Requested -> Just Received
+  RequestedTwice -> Just Requested
+  Pending -> Just Received
   PendingTwice -> Just Pending
-  PendingAndAsked -> Just Asked
+  PendingAndRequested -> Just Requested
   _ -> Nothing
 
--- | Whether a request is heard before anything else is done.
+-- | Whether a request is received before any other step.
 isPending :: Request -> Bool
-isPending = (`elem` [Pending, PendingTwice, PendingAndAsked])
+isPending = (`elem` [Pending, PendingTwice, PendingAndRequested])
 
--- | The steps of what runs in a thread, with what is left to hear after each.
-running' :: Now -> Request -> Running -> [(Action, Now, Request, Running)]
-running' t asks r
-  | isPending asks, not (null heard') = heard'
-  | otherwise = [(l, t', born, r') | (l, t', r') <- steps t r] ++ heard'
+-- | The steps of what runs in a thread, with the requests that are left after each.
+running' :: Now -> Request -> Running -> [(Effect, Now, Request, Running)]
+running' t requests r
+  | isPending requests, not (null received) = received
+  | otherwise = [(l, t', startedRequest, r') | (l, t', r') <- steps t r] ++ received
  where
-  heard' = [(Happens event, t, asks', r') | Just asks' <- [heard asks], (event, r') <- hear t r]
-  born = if asks == Unborn then Unasked else asks
+  received = [(Emits transition, t, requests', r') | Just requests' <- [afterReceiving requests], (transition, r') <- receive t r]
+  startedRequest = if requests == NotStarted then NoRequest else requests
 
--- | What may become of it if it hears the request now. None: it cannot.
-hear :: Now -> Running -> [(Transition, Running)]
-hear t = \case
+-- | The possible results of receiving a stop request now. None: it cannot be received.
+receive :: Now -> Running -> [(Transition, Running)]
+receive t = \case
   Starting _ -> stopped
   Opening _ -> stopped
   Calling _ _ -> stopped
   Acting name until' script
-    | deaf (masking script) -> []
-    | otherwise -> [(name `Does` Hears, respond name (whenAsked script))]
+    | uninterruptible (masking script) -> []
+    | otherwise -> [(Action name ReceivesStop, respond name (onStop script))]
    where
-    deaf = \case
+    uninterruptible = \case
       Unmasked -> False
       Masked -> clock t >= until'
       Uninterruptible -> True
   Cleaning {} -> []
-  Tidying name until'
-    | clock t < until' -> [(name `Does` Hears, Over (Stopped Nothing))]
+  CleaningInterruptibly name until'
+    | clock t < until' -> [(Action name ReceivesStop, Over (Stopped Nothing))]
     | otherwise -> []
-  first `AndThen` second -> fmap (\r -> andThen t r second) <$> hear t first
-  first `OrElse` second -> fmap (\r -> orElse t r second) <$> hear t first
-  Retracting k r -> within' (Retracting k) r
-  Obtaining k r -> within' (Obtaining k) r
-  Answering k r -> fmap (Answering k) <$> hear t r
-  Looking operator threads -> [(Silent, conclude operator (Stopped Nothing) nothing some) | some <- started threads]
+  first `AndThen` second -> fmap (\r -> andThen t r second) <$> receive t first
+  first `OrElse` second -> fmap (\r -> orElse t r second) <$> receive t first
+  StoppingChild k r -> within' (StoppingChild k) r
+  AwaitingChild k r -> within' (AwaitingChild k) r
+  AsChild k r -> fmap (AsChild k) <$> receive t r
+  Waiting operator threads -> [(Silent, conclude operator (Stopped Nothing) noSource some) | some <- started threads]
   Reacting _ source _ phase -> [(Silent, conclude React (Stopped Nothing) source some) | some <- started (threadsOf phase)]
   Sharing source body -> [(Silent, conclude Share (Stopped Nothing) source some) | some <- started [body]]
   Concluding operator _ source threads
-    | rested source, all over threads -> [(Silent, Over (outcome operator (Stopped Nothing) source threads))]
+    | allStopped source, all over threads -> [(Silent, Over (outcome operator (Stopped Nothing) source threads))]
     | otherwise -> []
   Forking _ _ -> stopped
   Forked _ -> stopped
@@ -243,39 +243,39 @@ hear t = \case
   stopped = [(Silent, Over (Stopped Nothing))]
   within' around = \case
     Over _ -> stopped
-    r -> fmap (whenSuccessful around) <$> hear t r
+    r -> fmap (whenSuccessful around) <$> receive t r
   respond name = \case
     StopsAtOnce -> Over (Stopped Nothing)
     StopsAfter n -> Cleaning name (clock t + n) Nothing
-    TidiesUp n -> Tidying name (clock t + n)
+    CleansUpInterruptibly n -> CleaningInterruptibly name (clock t + n)
     EndsAfter n how -> Cleaning name (clock t + n) (Just how)
-  -- Between the starts of two branches, too.
+  -- The request may also arrive between the starts of two branches.
   started threads = case reverse threads of
-    Thread _ (Living Unborn _) : others -> threads : started (reverse others)
+    Thread _ (Live NotStarted _) : others -> threads : started (reverse others)
     _ -> [threads]
 
 -- * Branches
 
 threadSteps :: Now -> Thread -> Steps Thread
-threadSteps t (Thread label life) = case life of
-  -- It has done all that it does, and can still be stopped.
-  Living asks (Returning result) -> returning Finished asks result
-  Living asks (Answering k (Returning result)) -> returning (FinishedChild k) asks result
-  Living asks r -> [(l, t', becomes asks' r') | (l, t', asks', r') <- running' t asks r]
+threadSteps t (Thread label state) = case state of
+  -- The work is done, and a stop request can still arrive.
+  Live requests (Returning result) -> returning Finished requests result
+  Live requests (AsChild k (Returning result)) -> returning (FinishedChild k) requests result
+  Live requests r -> [(l, t', becomes requests' r') | (l, t', requests', r') <- running' t requests r]
   Finished result -> [ends' t result]
-  FinishedChild k result -> [ends' t {answers = Map.insert k (Just (answer (asOutcome result))) (answers t)} result]
+  FinishedChild k result -> [ends' t {childResults = Map.insert k (Just (answer (asOutcome result))) (childResults t)} result]
   Ended _ -> []
  where
-  returning finished asks result =
-    [over' | not (isPending asks), over' <- threadSteps t (Thread label (finished result))]
-      ++ [(Happens Silent, t, Thread label (finished (Stopped Nothing))) | Just _ <- [heard asks]]
-  becomes asks = \case
-    Over result@(Succeeded _) -> Thread label (Living asks (Returning result))
-    Answering k (Over result@(Succeeded _)) -> Thread label (Living asks (Answering k (Returning result)))
-    Answering k (Over result) -> Thread label (FinishedChild k (asOutcome result))
+  returning finished requests result =
+    [over' | not (isPending requests), over' <- threadSteps t (Thread label (finished result))]
+      ++ [(Emits Silent, t, Thread label (finished (Stopped Nothing))) | Just _ <- [afterReceiving requests]]
+  becomes requests = \case
+    Over result@(Succeeded _) -> Thread label (Live requests (Returning result))
+    AsChild k (Over result@(Succeeded _)) -> Thread label (Live requests (AsChild k (Returning result)))
+    AsChild k (Over result) -> Thread label (FinishedChild k (asOutcome result))
     Over result -> Thread label (Finished (asOutcome result))
-    r -> Thread label (Living asks r)
-  ends' t' result = (Happens (IsOver label), t', Thread label (Ended (asOutcome result)))
+    r -> Thread label (Live requests r)
+  ends' t' result = (Emits (IsOver label), t', Thread label (Ended (asOutcome result)))
   answer = \case
     Stopped _ -> Failed childStopped
     result -> result
@@ -284,73 +284,73 @@ threadSteps t (Thread label life) = case life of
 
 reactions :: Now -> Program -> Source -> View -> Phase -> Steps Running
 reactions t p source v phase = case phase of
-  Choosing moment -> case look t moment v source of
+  Choosing mode -> case readSource t mode v source of
     Nothing -> []
     Just (Left wrong) -> silently t (conclude React wrong source [])
-    Just (Right seen) -> obey seen
-  Idling old -> case look t Later v source of
+    Just (Right seen) -> react seen
+  Idling old -> case readSource t Reread v source of
     Just (Left wrong) -> silently t (conclude React wrong source [])
-    Just (Right seen) | differs old seen -> obey seen
+    Just (Right seen) | differs old seen -> react seen
     _ -> []
   Following old branch ->
     inThread (Following old) branch
-      -- A branch that has ended by itself is looked at first.
-      ++ case (endOf branch, look t Later v source) of
+      -- The end of the branch has priority over the signal.
+      ++ case (endOf branch, readSource t Reread v source) of
         (Just result, _) -> silently t (conclude React result source [branch])
-        (_, Just (Left wrong)) -> silently t (switching (Conclude wrong) source branch)
+        (_, Just (Left wrong)) -> silently t (stopping (Conclude wrong) source branch)
         (_, Just (Right seen@(value, t', source')))
-          | differs old seen -> silently t' (switching (reaction p (valueOf p value)) source' branch)
+          | differs old seen -> silently t' (stopping (reaction p (valueOf p value)) source' branch)
         _ -> []
-  Preempting next branch -> case endOf branch of
-    Just result -> silently t (switched next result branch)
-    Nothing -> inThread (Preempting next) branch
+  Stopping next branch -> case endOf branch of
+    Just result -> silently t (afterStop next result branch)
+    Nothing -> inThread (Stopping next) branch
   Recovering before recovery -> case endOf recovery of
     Just result -> silently t (recovered before result recovery)
     Nothing -> inThread (Recovering before) recovery
-  Resting -> []
-  Beginning -> silently t (beginning t p source)
+  AwaitingSensors -> []
+  Restarting -> silently t (restarted t p source)
  where
   inThread inPlace branch = [(l, t', Reacting p source v (inPlace branch')) | (l, t', branch') <- threadSteps t branch]
   differs old (value, _, _) = valueOf p value /= old
-  obey (seen, t', source') = silently t' $ case reaction p value of
+  react (seen, t', source') = silently t' $ case reaction p value of
     Run act -> Reacting p source' v (Following value (thread t' (nameOf p value) act))
-    RunToEnd recovery -> recover Nothing (askSource source') recovery
+    RunToEnd recovery -> recover Nothing (requestStopOfSource source') recovery
     Idle -> Reacting p source' v (Idling value)
     Conclude result -> conclude React result source' []
    where
     value = valueOf p seen
-  -- Unless there will be nothing to sense, the sensors go on.
-  switching next source' branch = Reacting p (alike source') v (Preempting next (ask branch))
+  -- The sensors keep running if the signal is read again after the branch has stopped.
+  stopping next source' branch = Reacting p (keepOrStop source') v (Stopping next (requestStop branch))
    where
-    alike = case next of
+    keepOrStop = case next of
       Run _ -> id
       Idle -> id
-      _ -> askSource
-  switched next result branch = case (next, result) of
+      _ -> requestStopOfSource
+  afterStop next result branch = case (next, result) of
     (Conclude result', Stopped _) -> conclude React result' source []
     (Conclude _, _) -> conclude React result source [branch]
     (RunToEnd _, Succeeded _) -> conclude React result source []
     (RunToEnd recovery, Stopped _) -> recover Nothing source recovery
     (RunToEnd recovery, _) -> recover (Just branch) source recovery
-    (_, Stopped _) -> Reacting p source (viewOf t source) (Choosing Later)
+    (_, Stopped _) -> Reacting p source (viewOf t source) (Choosing Reread)
     _ -> conclude React result source [branch]
   recover before source' recovery = Reacting p source' v (Recovering before (thread t "monitor: recovery" recovery))
   recovered before result recovery = case (before >>= endOf, result) of
     (Just wrong, _) -> conclude React wrong source (maybe id (:) before [recovery])
-    (_, Succeeded _) -> reacting t p source v Resting
+    (_, Succeeded _) -> afterSensorStep t p source v AwaitingSensors
     _ -> conclude React result source [recovery]
 
--- | An operator whose sensors have taken a step.
-reacting :: Now -> Program -> Source -> View -> Phase -> Running
-reacting t p source v phase = case phase of
-  Resting
-    | not (null (faultsOf source)) -> conclude React (Failed "a sensor faulted") source []
-    | rested source, any borrows (signals p) -> Reacting p source v Beginning
-    | rested source -> beginning t p source
+-- | The operator after a step of its sensors.
+afterSensorStep :: Now -> Program -> Source -> View -> Phase -> Running
+afterSensorStep t p source v phase = case phase of
+  AwaitingSensors
+    | not (null (pollerFaults source)) -> conclude React (Failed "a sensor faulted") source []
+    | allStopped source, any usesShared (signals p) -> Reacting p source v Restarting
+    | allStopped source -> restarted t p source
   _ -> Reacting p source v phase
 
--- | It begins once more.
-beginning :: Now -> Program -> Source -> Running
-beginning t p source = Reacting p fresh (viewOf t fresh) (Choosing Later)
+-- | The operator, with restarted sensors.
+restarted :: Now -> Program -> Source -> Running
+restarted t p source = Reacting p fresh (viewOf t fresh) (Choosing Reread)
  where
-  fresh = startedAt t source
+  fresh = startSource t source

@@ -1,13 +1,13 @@
 -- |
--- What operators decide when they look.
+-- The decisions of operators.
 module Semantics.Verdict
-  ( -- * What comes of the branches
+  ( -- * Verdicts on branches
     verdict
   , conclude
   , concluding
   , outcome
 
-    -- * What to do for a signal
+    -- * Reactions to signals
   , valueOf
   , reaction
   , nameOf
@@ -20,9 +20,9 @@ import Semantics.Program
 import Semantics.Source
 import Semantics.State
 
--- * What comes of the branches
+-- * Verdicts on branches
 
--- | What an operator makes of its branches when it looks.
+-- | The verdict of an operator when it reads the state of its branches.
 verdict :: Operator -> [Thread] -> Maybe Result
 verdict operator threads = case operator of
   -- The first to finish; on a tie the left one.
@@ -32,8 +32,7 @@ verdict operator threads = case operator of
   Gather
     | all completed threads -> Just (Succeeded (Several [value | Succeeded value <- ends']))
     | otherwise -> firstOf wrongs
-  -- The body, however it ends; or what was forked, when it goes wrong (which it does not
-  -- when it is stopped).
+  -- The body, however it ends; or a child that fails or faults (not one that stops).
   Nursery -> case threads of
     body : _ | over body -> endOf body
     _ -> firstOf (filter (/= Stopped Nothing) wrongs)
@@ -43,25 +42,26 @@ verdict operator threads = case operator of
   wrongs = mapMaybe endOf (filter (not . completed) threads)
   firstOf = find (const True)
 
--- | Having come to a verdict, an operator asks all that still runs to stop, at once.
+-- | With a verdict, an operator requests the stop of all that still runs, at once.
 conclude :: Operator -> Result -> Source -> [Thread] -> Running
 conclude operator result source threads =
-  concluding operator result (askSource source) (map ask threads)
+  concluding operator result (requestStopOfSource source) (map requestStop threads)
 
--- | ... and waits until all has ended. Of those that have, only faults matter; but a
--- body may still look at what is shared.
+-- | ... and waits until all has ended. Of the threads that have ended, only those with faults
+-- are kept; but a body may still read the shared source.
 concluding :: Operator -> Result -> Source -> [Thread] -> Running
 concluding operator result source threads
-  | Stopped _ <- result, rested kept, all over living = Over (outcome operator result kept living)
-  | otherwise = Concluding operator result kept living
+  | Stopped _ <- result, allStopped kept, all over unfinished = Over (outcome operator result kept unfinished)
+  | otherwise = Concluding operator result kept unfinished
  where
-  living = filter (not . harmless) threads
+  unfinished = filter (not . harmless) threads
   kept
-    | operator == Share, not (all over living) = source
+    | operator == Share, not (all over unfinished) = source
     | otherwise = remaining source
   harmless thread' = over thread' && null (faultOf thread')
 
--- | The caller's cancellation comes first, then the leftmost fault, then the verdict.
+-- | The outcome is, in this order, the caller's cancellation, the leftmost fault, the
+-- verdict.
 outcome :: Operator -> Result -> Source -> [Thread] -> Result
 outcome operator result source threads = case (result, faults) of
   (Stopped _, fault : _) -> Stopped (Just fault)
@@ -69,20 +69,20 @@ outcome operator result source threads = case (result, faults) of
   _ -> result
  where
   faults
-    -- The one starts its body first, the others their sensors.
-    | operator == Share = concatMap faultOf threads ++ faultsOf source
-    | otherwise = faultsOf source ++ concatMap faultOf threads
+    -- 'Share' starts its body first, the others start their sensors first.
+    | operator == Share = concatMap faultOf threads ++ pollerFaults source
+    | otherwise = pollerFaults source ++ concatMap faultOf threads
 
--- * What to do for a signal
+-- * Reactions to signals
 
--- | What an operator follows of the value of its signal.
+-- | The part of the signal's value on which the operator depends.
 valueOf :: Program -> Int -> Int
 valueOf p value = case p of
   Switch {} -> value
   TeleoReactive _ -> value
   _ -> fromEnum (holds value)
 
--- | What is to be done for the value of the signal.
+-- | The reaction to the value of the signal.
 reaction :: Program -> Int -> Reaction
 reaction p value = case p of
   RSelect _ left right -> Run (if isTrue then left else right)

@@ -1,7 +1,7 @@
 {-# OPTIONS_GHC -fno-omit-yields #-}
 
 -- |
--- A loop that never allocates, compiled so that it can be interrupted all the same.
+-- A loop that never allocates, compiled so that it can still be interrupted.
 module Sim.Busy (busy) where
 
 -- | Counts for ever.

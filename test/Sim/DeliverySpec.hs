@@ -27,87 +27,87 @@ import Support
 spec :: Spec
 spec = guarded $ do
   describe "An exception that finds its target masked is raised" $ do
-    describe "at the unmask, under every one of 1,000 schedules," atTheUnmask
-    describe "as GHC does:" asGHC
-  describe "The thread that has thrown it" senders
+    describe "at the unmask, under each of 1,000 schedules," atTheUnmask
+    describe "as in GHC:" asGHC
+  describe "The thread that throws it" throwers
   describe "A branch" endOfBranch
 
--- | How the run ended, under 1,000 schedules.
+-- | How the run ends under 1,000 schedules.
 everyEnd :: Show a => Behavior a -> IO [String]
-everyEnd act = nub . map (told . outcome) <$> mapM (\seed -> simulateWith defaults {scheduled = Seeded seed} act) [1 .. 1000]
+everyEnd act = nub . map (described . outcome) <$> mapM (\seed -> simulateWith defaults {scheduled = Seeded seed} act) [1 .. 1000]
  where
-  told end = case end of
+  described end = case end of
     Returned a -> show a
     other -> explain other
 
 atTheUnmask :: Spec
 atTheUnmask = do
-  late "if a checkpoint follows" (deaf >> checkpoint)
-  late "if the clock is read" (deaf >> void now)
-  late "if a checkpoint is unmasked within a mask" (mask $ \restore -> deaf >> restore checkpoint)
-  late "if nothing follows" deaf
-  late "if what is unmasked within a mask does nothing" (mask $ \restore -> deaf >> restore (pure ()))
-  late "if it waits for a loser that is slow to stop" (firstOf [sleep 0.1, sleep 9 `onException` deaf])
+  late "if a checkpoint follows" (uninterruptible >> checkpoint)
+  late "if the clock is read" (uninterruptible >> void now)
+  late "if a checkpoint is restored within a mask" (mask $ \restore -> uninterruptible >> restore checkpoint)
+  late "if nothing follows" uninterruptible
+  late "if an empty action is restored within a mask" (mask $ \restore -> uninterruptible >> restore (pure ()))
+  late "if the target waits for a loser that is slow to stop" (firstOf [sleep 0.1, sleep 9 `onException` uninterruptible])
  where
   late name act = it name $ everyEnd (timeout 0.15 (act >> pure "done") ? pure "timed out") `shouldReturn` [show "timed out"]
-  deaf = uninterruptibleMask_ (sleep 0.2)
+  uninterruptible = uninterruptibleMask_ (sleep 0.2)
 
--- | Runs a thread, which says when it is masked, beside those that throw to it; and gives what
--- it has written down, and then how it ended.
+-- | Runs a target thread and an action that throws to it once the target has signalled that it
+-- is masked. Returns what the target has recorded, and then how it ended.
 thrownAt :: ((String -> IO ()) -> IO () -> IO ()) -> (ThreadId -> IO ()) -> Behavior [String]
 thrownAt target throws = do
-  book <- newIORef []
+  logged <- newIORef []
   masked <- newTVarIO False
-  let say text = modifyIORef book (text :)
+  let record text = modifyIORef logged (text :)
       ready = atomically (writeTVar masked True)
-  thread <- mask_ (start (Label "target" "") (target say ready))
+  thread <- mask_ (start (Label "target" "") (target record ready))
   atomically (readTVar masked >>= STM.check)
   throws (threadId thread)
   end <- atomically (threadEnd thread)
-  say (either show (const "returned") end)
-  reverse <$> readIORef book
+  record (either show (const "returned") end)
+  reverse <$> readIORef logged
 
 asGHC :: Spec
 asGHC = do
-  it "several in the order in which GHC raises them" $ do
+  it "several exceptions in the same order as in GHC" $ do
     run <- simulate $ do
       opened <- newTVarIO False
       thrownAt
-        ( \say ready -> mask $ \restore -> do
+        ( \record ready -> mask $ \restore -> do
             ready
             uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
-            untilNone (restore (pure ())) say
+            untilNone (restore (pure ())) record
         )
-        (\target -> mapM_ (\name -> send' target name >> sleep 1) ["a", "b", "c"] >> atomically (writeTVar opened True))
+        (\target -> mapM_ (\name -> throwToIt target name >> sleep 1) ["a", "b", "c"] >> atomically (writeTVar opened True))
     order <- realOrder ["a", "b", "c"]
     returned run `shouldBe` Just (order ++ ["returned"])
-  it "not at an operation that need not wait, but at one that has to" $ do
+  it "not at an operation that need not block, but at one that blocks" $ do
     run <- simulate $ do
       opened <- newTVarIO False
       thrownAt
-        ( \say ready -> mask_ $ do
+        ( \record ready -> mask_ $ do
             ready
             uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
-            checkpoint >> say "went on"
+            checkpoint >> record "went on"
             _ <- now
-            say "and on"
-            atomically STM.retry `catch` \(e :: Cancel) -> say (show e)
+            record "and on"
+            atomically STM.retry `catch` \(e :: Cancel) -> record (show e)
         )
-        (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
+        (\target -> throwToIt target "a" >> sleep 1 >> atomically (writeTVar opened True))
     returned run `shouldBe` Just ["went on", "and on", show (Cancel "a"), "returned"]
   it "by interruptible, within a mask" $ do
     run <- simulate $ do
       opened <- newTVarIO False
       thrownAt
-        ( \say ready -> mask_ $ do
+        ( \record ready -> mask_ $ do
             ready
             uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
-            say "went on"
-            interruptible (say "not this")
+            record "went on"
+            interruptible (record "not this")
         )
-        (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
+        (\target -> throwToIt target "a" >> sleep 1 >> atomically (writeTVar opened True))
     returned run `shouldBe` Just ["went on", show (Cancel "a")]
-  it "to a thread that has not started: where it first unmasks" $ do
+  it "where a thread that has not started first unmasks" $ do
     ran <- newIORef False
     forM_ [1 .. 300] $ \seed -> do
       writeIORef ran False
@@ -116,10 +116,10 @@ asGHC = do
         interrupt (threadId thread) (Cancel "a")
         atomically (threadEnd thread)
       fmap (either (show :: SomeException -> String) (\() -> "returned")) (returned run) `shouldBe` Just (show (Cancel "a"))
-  it "to a thread itself: at once, whatever is masked" $ do
+  it "at once if a thread throws it to itself, in any masking state" $ do
     run <- simulate (uninterruptibleMask_ (myThreadId >>= \me -> interrupt me (Cancel "me") >> pure "went on"))
     explain (outcome run) `shouldBe` "it was cancelled: " ++ show (Cancel "me")
-  it "and the steps of the run say when" $ do
+  it "and is in the steps of the run at that time" $ do
     run <- simulate $ do
       opened <- newTVarIO False
       thrownAt
@@ -129,19 +129,19 @@ asGHC = do
             annotate "unmasks"
             restore (pure ()) `catch` \(_ :: Cancel) -> annotate "handles"
         )
-        (\target -> send' target "a" >> sleep 1 >> atomically (writeTVar opened True))
+        (\target -> throwToIt target "a" >> sleep 1 >> atomically (writeTVar opened True))
     [(at s, did s) | s <- steps run, label s == Label "target" "", did s `notElem` [Starts, Ends]]
       `shouldBe` [(2, Note "unmasks"), (2, ReceivesException (show (Cancel "a"))), (2, Note "handles")]
 
 -- | Unmasks until nothing is raised any more.
 untilNone :: IO () -> (String -> IO ()) -> IO ()
-untilNone unmasking say = try unmasking >>= either (\(e :: Cancel) -> say (show e) >> untilNone unmasking say) pure
+untilNone unmasking record = try unmasking >>= either (\(e :: Cancel) -> record (show e) >> untilNone unmasking record) pure
 
 -- | The order in which GHC raises exceptions that are pending on one thread, all thrown from
 -- its own capability.
 realOrder :: [String] -> IO [String]
 realOrder names = do
-  book <- newIORef []
+  logged <- newIORef []
   (here, _) <- threadCapability =<< myThreadId
   end <- newEmptyMVar
   _ <- mask_ $ forkOnWithUnmask here $ \unmask -> do
@@ -150,29 +150,29 @@ realOrder names = do
       thrower <- forkOnWithUnmask here (\free -> free (throwTo me (Cancel name)))
       let untilBlocked = threadStatus thrower >>= \s -> unless (s == ThreadBlocked BlockedOnException) (yield >> untilBlocked)
       untilBlocked
-    untilNone (unmask (pure ())) (\text -> modifyIORef book (text :))
+    untilNone (unmask (pure ())) (\text -> modifyIORef logged (text :))
     putMVar end ()
   takeMVar end
-  reverse <$> readIORef book
+  reverse <$> readIORef logged
 
-send' :: ThreadId -> String -> IO ()
-send' target name = throwToAll (const (Cancel name)) [target]
+throwToIt :: ThreadId -> String -> IO ()
+throwToIt target name = throwToAll (const (Cancel name)) [target]
 
 returned :: Run a -> Maybe a
 returned run = case outcome run of
   Returned a -> Just a
   _ -> Nothing
 
-senders :: Spec
-senders = do
-  it "waits until it was raised" $ do
+throwers :: Spec
+throwers = do
+  it "blocks until it is raised" $ do
     run <- simulate $ do
       target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (sleep 5)))
       sleep 1
       interrupt (threadId target) (Cancel "a")
       now
     returned run `shouldBe` Just 5
-  it "goes on when its target ends without, and at once when that has ended" $ do
+  it "continues when its target ends without receiving it, and at once if the target has ended" $ do
     run <- simulate $ do
       target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (sleep 3 >> throwIO (Fault "bug"))))
       sleep 1
@@ -182,7 +182,7 @@ senders = do
       interrupt (threadId target) (Cancel "b")
       (,,) first <$> now <*> pure (either (show :: SomeException -> String) (\() -> "returned") end)
     returned run `shouldBe` Just (3, 3, show (Fault "bug"))
-  it "has thrown nothing if it is interrupted while it waits" $
+  it "has thrown nothing if it is interrupted while it blocks" $
     everyEnd
       ( do
           target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (sleep 5) >> checkpoint))
@@ -192,7 +192,7 @@ senders = do
           (,) <$> fmap shown (atomically (threadEnd sender)) <*> fmap shown (atomically (threadEnd target))
       )
       `shouldReturn` [show (show (Cancel "b"), "returned")]
-  it "receives what is pending for itself, and has thrown nothing then" $
+  it "receives its own pending exception first, and then has thrown nothing" $
     everyEnd
       ( do
           opened <- newTVarIO False
@@ -223,16 +223,16 @@ senders = do
     explain (outcome run) `shouldSatisfy` ("interrupt: messenger waits for target, to hear an exception" `isInfixOf`)
     performMajorGC
     (() <$) <$> deRefWeak weak `shouldReturn` Nothing
-  it "has thrown nothing when the run has ended, and what is left is unwound" $ do
-    book <- newIORef []
+  it "has thrown nothing if the run ends and the remaining threads are unwound" $ do
+    logged <- newIORef []
     _ <- simulate $ do
       target <- mask_ . start (Label "target" "") $ do
         end <- try (uninterruptibleMask_ (atomically STM.retry))
-        either (\(_ :: SomeException) -> modifyIORef book ("unwound" :)) (\() -> pure ()) end
+        either (\(_ :: SomeException) -> modifyIORef logged ("unwound" :)) (\() -> pure ()) end
       throwToAll (const (Cancel "a")) [threadId target]
       sleep 1
       atomically STM.retry :: IO ()
-    readIORef book `shouldReturn` ["unwound"]
+    readIORef logged `shouldReturn` ["unwound"]
  where
   shown = either (show :: SomeException -> String) (\() -> "returned")
 
@@ -245,7 +245,7 @@ endOfBranch = do
       throwToAll (const (Cancel "a")) [threadId target]
       either (show :: SomeException -> String) (\() -> "returned") <$> atomically (threadEnd target)
     ends `shouldMatchList` [show "returned", show (show (Cancel "a"))]
-  it "that has none can be stopped too" $ do
+  it "without operations can be stopped, too" $ do
     did' <- newIORef (0 :: Int)
     ends <- everyEnd $ do
       target <- mask_ (start (Label "target" "") (modifyIORef did' (+ 1)))
@@ -256,7 +256,7 @@ endOfBranch = do
       pure (at' > earlier, either (show :: SomeException -> String) (\() -> "returned") end)
     ends `shouldContain` [show (True, show (Cancel "a"))]
 
-  it "that reads a sensor does not lose the fault of a reading which could not be interrupted" $
+  it "that polls a sensor keeps the fault of an uninterruptible reading" $
     everyEnd (timeout 1 (Signal.waitUntil (Signal.polling 5 (uninterruptibleMask_ (sleep 2 >> throwIO (Fault "bug")) :: Behavior Bool))))
       `shouldReturn` ["it faulted: " ++ displayException (Fault "bug")]
 

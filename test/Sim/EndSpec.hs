@@ -1,7 +1,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- How a run ends, and what is said of it.
+-- How a run ends, and how its end is reported.
 module Sim.EndSpec (spec) where
 
 import Control.Concurrent (forkIO, newEmptyMVar, putMVar, takeMVar)
@@ -27,11 +27,11 @@ import Support (guarded)
 spec :: Spec
 spec = guarded $ do
   describe "The record of a mock world ends when the run does" records
-  describe "With a finite end" ends
-  describe "What went wrong is said" faults'
-  describe "A wide program" wide
+  describe "With a finite endAt" ends
+  describe "The cause is reported" faults'
+  describe "A run with many threads" wide
 
--- | A motor that is switched on; what follows is to switch it off.
+-- | Runs an action while a motor is switched on; the cleanup switches it off.
 motorOf :: Mock -> IO (Behavior () -> Behavior ())
 motorOf mock = do
   motor <- condition mock "motor runs" [(0, False)]
@@ -41,13 +41,13 @@ records :: Spec
 records = do
   forM_
     [ ("at endAt", \act -> simulateWith defaults {endAt = 10} (act (sleep 100)))
-    , ("at endAt, though nothing would ever happen", \act -> simulateWith defaults {endAt = 10} (act (atomically retry)))
+    , ("at endAt, when all threads are blocked for ever", \act -> simulateWith defaults {endAt = 10} (act (atomically retry)))
     , ("in a deadlock", \act -> simulate (act (atomically retry)))
     , ("in a livelock", \act -> simulateWith defaults {livelockLimit = 1000} (act (forever checkpoint)))
     , ("in a deadlock, in another thread", \act -> simulate (both (act (atomically retry)) (sleep 1)))
-    , ("where it waits outside", \act -> simulate (act (newEmptyMVar >>= takeMVar)))
+    , ("when it blocks outside of the simulation", \act -> simulate (act (newEmptyMVar >>= takeMVar)))
     ]
-    $ \(name, running') -> it ("and does not hold what is unwound: " ++ name) $ do
+    $ \(name, running') -> it ("and does not contain the unwinding: " ++ name) $ do
       mock <- newMock
       motor <- motorOf mock
       run <- running' motor
@@ -57,22 +57,22 @@ records = do
       mock `shouldRecord` eventually (becoming "motor runs" True)
       (mock `shouldRecord` whenever (becoming "motor runs" True) (eventually (becoming "motor runs" False)))
         `shouldThrow` \(BrokenClaim why) -> "it never came" `isInfixOf` why
-  it "and does not hold what is unwound: when whoever simulates is cancelled" $ do
+  it "and does not contain the unwinding: when the caller of the simulation is cancelled" $ do
     mock <- newMock
     motor <- motorOf mock
     begun <- newEmptyMVar
     let going = simulateWith defaults {livelockLimit = maxBound} (motor (checkpoint >> putMVar begun () >> forever checkpoint))
     withAsync (void going) $ \caller -> takeMVar begun >> cancel caller
-    -- (The cancellation itself finds the behaviour anywhere, but not in its cleanup.)
+    -- (The cancellation can arrive anywhere in the behaviour, except in its cleanup.)
     count (becoming "motor runs" False) <$> happened mock `shouldReturn` 1
-  it "but holds all that was due by then" $ do
+  it "but contains all changes that were due by then" $ do
     mock <- newMock
     low <- condition mock "low" [(0, False), (50, True), (70, False)]
     _ <- simulateWith defaults {endAt = 60} (begin mock >> Signal.waitUntil (Signal.watching retry))
     mock `shouldRecord` eventually (becoming "low" True)
     count (becoming "low" False) <$> happened mock `shouldReturn` 1
     void (evaluate low)
-  it "and a run that returns has all on record that it did" $ do
+  it "and contains everything that a returning run has done" $ do
     mock <- newMock
     motor <- motorOf mock
     _ <- simulate (motor (sleep 3))
@@ -80,19 +80,19 @@ records = do
 
 ends :: Spec
 ends = do
-  it "the time comes to it, though nothing would ever happen" $ do
+  it "a run ends then, when all threads are blocked for ever" $ do
     run <- simulateWith defaults {endAt = 60} (sleep 5 >> atomically retry :: Behavior ())
     (explain (outcome run), finished run) `shouldBe` ("the virtual time has come to the end that was set", 60)
-  it "a run is over that has no end of its own, at once" $ do
+  it "a run without an end of its own ends then" $ do
     run <- simulateWith defaults {endAt = 60} (forever (sleep 1) :: Behavior ())
     (explain (outcome run), finished run) `shouldBe` ("the virtual time has come to the end that was set", 60)
-  it "each run of an exploration has it, by one word" $ do
+  it "each run of an exploration has it, by endingAt" $ do
     report <- explore (randomly 20 `endingAt` 60) $ \run -> do
       made <- run (forever (sleep 1) :: Behavior ())
       when (finished made /= 60) (fail (show (finished made)))
     schedules report `shouldBe` 20
-  it "or else a run without an end is cut off, and what is said names endAt, and how far it came" $ do
-    -- By default it is over within 10 s.
+  it "no run reaches realTimeLimit; otherwise the report names endAt, realTimeLimit and the virtual time" $ do
+    -- By default the run is over within 10 s.
     realTimeLimit defaults `shouldBe` 9
     begun <- getMonotonicTime
     run <- simulateWith defaults {realTimeLimit = 0.2} (forever (sleep 1) :: Behavior ())
@@ -107,20 +107,20 @@ ends = do
 
 faults' :: Spec
 faults' = do
-  it "of one whose text throws an exception" $ do
+  it "for an exception whose text throws an exception" $ do
     run <- simulate (throwIO Unshowable :: Behavior ())
     explain (outcome run) `shouldBe` "it faulted: it was <its text throws an exception>"
-  it "of one that is thrown to another thread, in the steps too" $ do
+  it "for such an exception that is thrown in a branch, also in the steps" $ do
     run <- simulate (parallel (sleep 1) (sleep 2 `catch` \(e :: SomeException) -> throwIO (if null (show e) then toException e else toException Unshowable)))
     explain (outcome run) `shouldBe` "it faulted: it was <its text throws an exception>"
     length (renderSteps (steps run)) `shouldSatisfy` (> 10)
-  it "of one that a scripted action throws, in the record too" $ do
+  it "for such an exception that a scripted action throws, also in the record" $ do
     mock <- newMock
     act <- action mock "act" [throws Unshowable :: Script ()]
     run <- simulate act
     length (renderSteps (steps run)) `shouldSatisfy` (> 10)
     mock `shouldRecord` exactly 1 (faultOf "act")
-  it "of a thread that waits for what another computes" $ do
+  it "for a thread that blocks on a value that another thread computes" $ do
     begun <- newEmptyMVar
     never' <- newEmptyMVar
     let lazy = unsafePerformIO (putMVar begun () >> takeMVar never') :: Int
@@ -133,7 +133,7 @@ faults' = do
       other -> expectationFailure (explain other)
     explain (outcome run) `shouldSatisfy` ("for a value that another thread is computing" `isInfixOf`)
 
--- | To show it throws, after a while.
+-- | Its 'show' throws, after some characters.
 data Unshowable = Unshowable
 
 instance Show Unshowable where
@@ -143,16 +143,16 @@ instance Exception Unshowable
 
 wide :: Spec
 wide = do
-  it "of 10,000 threads costs at most 12 times what one of 1,000 does" $
+  it "costs at most 12 times as much with 10,000 threads as with 1,000" $
     costs NonPreemptive fromIntegral
-  it "so in a random schedule, when all sleep until one moment" $
+  it "does so under a random schedule, too, when all threads sleep until the same time" $
     costs (Seeded 7) (const 1)
  where
   costs schedule' moment = do
     few <- allocated schedule' moment 1000
     many <- allocated schedule' moment 10000
     (many `div` 1000, few `div` 1000) `shouldSatisfy` \(m, f) -> m <= 12 * f
-  -- What it allocates stands for what it costs, and does not depend on what else the machine does.
+  -- The allocation is a measure of the cost that does not depend on the machine's load.
   allocated schedule' moment n = do
     performMajorGC
     before' <- allocated_bytes <$> getRTSStats

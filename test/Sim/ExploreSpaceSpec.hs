@@ -1,5 +1,5 @@
 -- |
--- How much memory an exploration takes.
+-- The memory that an exploration takes.
 module Sim.ExploreSpaceSpec (spec) where
 
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
@@ -28,17 +28,17 @@ spec = guarded . describe "In constant memory run" $ do
     (early, late) <- liveAfter 500 5000 (exhaustively 4) {search = Exhaustive 4 5000} recharging
     late - early `shouldSatisfy` (< 50000)
 
-  it "many schedules of many threads, of which the queue keeps only numbers" $ do
-    -- The first is before there is a queue: it is the queue itself that is small.
+  it "many schedules of many threads, since the queue keeps only numbers" $ do
+    -- The first measurement is before there is a queue, so it is the queue that is small.
     (early, late) <- liveAfter 1 200 (exhaustively 2) {search = Exhaustive 2 200} $
       void (allOf (replicate 60 (checkpoint >> sleep 1)))
     late - early `shouldSatisfy` (< 500000)
 
--- | The bytes that are live at the beginning of these two of the schedules: within the
--- simulation, for the watchdog forgets when there is none.
+-- | The live bytes at the beginning of these two schedules. They are measured within the
+-- simulation, since the watchdog ends when there is none.
 --
--- The watchdog may just be looking at a simulation that is over. So each is the least of
--- ten, one for each of the schedules before.
+-- The watchdog may still hold a simulation that is over. So each number is the minimum of
+-- ten schedules: this one and the nine before.
 liveAfter :: Int -> Int -> Plan -> Behavior a -> IO (Int64, Int64)
 liveAfter first second plan behavior = do
   getRTSStatsEnabled `shouldReturn` True
@@ -53,7 +53,7 @@ liveAfter first second plan behavior = do
       behavior
   (,) <$> readIORef early <*> readIORef late
 
--- | A battery gets low once, and for longer than a moment.
+-- | A battery that gets low once, for longer than the debounce.
 recharging :: Behavior ()
 recharging = do
   battery <- newTVarIO (20 :: Int)

@@ -1,5 +1,5 @@
 -- |
--- Many schedules of one behaviour.
+-- Exploring the schedules of a behaviour.
 module Sim.ExploreSpec (spec) where
 
 import Control.Concurrent.STM (modifyTVar', newTVarIO, readTVar, readTVarIO, retry, writeTVar)
@@ -23,7 +23,8 @@ spec = guarded $ do
   describe "A counterexample" counterexample
   describe "A property" properties
 
--- | Two robots count to two, and forget that the other one does.
+-- | The given number of branches increment a counter, but read and write it in separate
+-- transactions.
 counting :: Int -> (Behavior () -> IO (Run ())) -> IO ()
 counting n simulateIt = do
   counter <- newTVarIO (0 :: Int)
@@ -39,14 +40,14 @@ counting n simulateIt = do
 
 random :: Spec
 random = do
-  it "runs as many schedules as it is told" $ do
+  it "runs the given number of schedules" $ do
     runs <- newIORef (0 :: Int)
     report <- explore (randomly 123) $ \run -> modifyIORef runs (+ 1) >> void (run (both (sleep 1) (sleep 1)))
     (,) (schedules report) <$> readIORef runs `shouldReturn` (123, 123)
   it "finds a defect that needs one pre-emption" $ do
     found <- tryExplore (randomly 1000) (counting 2)
     either (const "found") show found `shouldBe` "found"
-  it "is the same for the same seed, and another for another" $ do
+  it "is the same for the same seed, and different for a different seed" $ do
     let from seed = do
           seen <- newIORef []
           _ <- explore (randomly 20) {search = Random 20 seed} $ \run -> do
@@ -59,8 +60,8 @@ random = do
 
 exhaustive :: Spec
 exhaustive = do
-  it "runs every order of what does not wait" $ do
-    -- Three branches of one step each, and all the orders of these.
+  it "runs every order of steps that do not block" $ do
+    -- Three branches of one step each, and all their orders.
     orders <- newIORef []
     report <- explore (exhaustively 2) $ \run -> do
       order <- newTVarIO ""
@@ -76,23 +77,23 @@ exhaustive = do
       modifyIORef seen (show (schedule made) :)
     all' <- readIORef seen
     length (nub all') `shouldBe` length all'
-  it "tries the alternatives of the latest decision first, by the numbers of the threads" $ do
+  it "tries the alternatives of the latest decision first, in the order of the thread numbers" $ do
     seen <- newIORef []
     _ <- explore (exhaustively 0) $ \run -> do
       made <- run (void (allOf [checkpoint, checkpoint, checkpoint]))
       modifyIORef seen (schedule made :)
     take 6 . reverse <$> readIORef seen
       `shouldReturn` map Preempting [[], [(13, 3)], [(9, 3)], [(8, 2)], [(8, 2), (12, 3)], [(8, 3)]]
-  it "finds nothing with fewer pre-emptions than a defect needs" $ do
-    let undisturbed k = either (const False) complete <$> tryExplore (exhaustively k) (counting 2)
-    (,) <$> undisturbed 0 <*> undisturbed 1 `shouldReturn` (True, False)
-  it "says so when there are more schedules than it may run" $ do
+  it "finds no defect with fewer pre-emptions than that needs" $ do
+    let exploredWith k = either (const False) complete <$> tryExplore (exhaustively k) (counting 2)
+    (,) <$> exploredWith 0 <*> exploredWith 1 `shouldReturn` (True, False)
+  it "reports that it is incomplete when there are more schedules than the limit" $ do
     report <- explore (exhaustively 3) {search = Exhaustive 3 50} $ \run -> void (run (both (sleep 1) (sleep 1)))
     (schedules report, complete report) `shouldBe` (50, False)
 
 counterexample :: Spec
 counterexample = do
-  it "is shrunk to as few switches as it takes" $ do
+  it "is shrunk to the fewest pre-emptions that it needs" $ do
     found <- tryExplore (randomly 1000) (counting 3)
     case found of
       Left c | Preempting s <- failing c -> length s `shouldBe` 1
@@ -106,7 +107,7 @@ counterexample = do
         again <- tryExplore (replaying (read printed)) (counting 3)
         either (show . reason) (const "it held") again `shouldBe` show (reason c)
       Right _ -> expectationFailure "it should have been found"
-  it "tells what happened, with times and threads" $ do
+  it "shows its steps, with times and threads" $ do
     found <- tryExplore (randomly 1000) (counting 2)
     case found of
       Left c -> do
@@ -117,17 +118,17 @@ counterexample = do
                      , ["0.000", "s", "3", "both:", "left", "(of", "2)", "saw", "0"]
                      ]
       Right _ -> expectationFailure "it should have been found"
-  it "shows what the property threw as the plan says" $ do
+  it "shows the property's exception with the plan's showException" $ do
     found <- tryExplore (randomly 1000) {showException = const "not two"} (counting 2)
     take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one switch, this happens:"]
-  it "shows what did not happen again as the plan says" $ do
+  it "shows an exception that did not occur again with the plan's showException" $ do
     runs <- newIORef (0 :: Int)
-    found <- tryExplore (randomly 1) {showException = maybe "another" (\(Fault what') -> "fault " ++ what') . fromException} $ \run -> do
+    found <- tryExplore (randomly 1) {showException = maybe "another" (\(Fault text) -> "fault " ++ text) . fromException} $ \run -> do
       n <- atomicModifyIORef' runs (\n -> (n + 1, n))
       _ <- run (pure ())
       when (n == 0) (throwIO (Fault "once"))
     either (show . reason) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
-  it "shows only the steps that the plan selects, and how many" $ do
+  it "shows only the steps that the plan selects, and their number" $ do
     found <- tryExplore (randomly 1000) {selectSteps = mentioning ["saw"]} (counting 2)
     (drop 2 . lines <$> either (Just . show) (const Nothing) found)
       `shouldBe` Just
@@ -136,13 +137,13 @@ counterexample = do
         , "     0.000 s  3 both: left (of 2)  saw 0"
         , "to see it again: explore (replaying (Preempting [(5,2)]))"
         ]
-  it "has the steps of some threads" $ do
+  it "can be narrowed to the steps of some threads" $ do
     run <- simulate (both (sleep 1) (both (sleep 1) (sleep 1)))
     map number (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
-  it "has the steps in which a name occurs, in a label or in what was done" $ do
+  it "can be narrowed to the steps that mention a name, in the label or in the kind of step" $ do
     run <- simulate (both (annotate "a") (annotate "left"))
     [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
-  it "tells the branches of two operators apart" $ do
+  it "distinguishes the branches of two operators" $ do
     run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
     lines (renderSteps (mentioning ["starts", "asks"] (steps run)))
       `shouldBe` [ "     0.000 s  1 both: left              starts"
@@ -155,13 +156,13 @@ counterexample = do
                  , "     3.000 s  2 both: right             asks 6 parallel: right to stop"
                  ]
     map parentNumber (take 2 (steps run)) `shouldBe` [-1, 0]
-  it "is found from a schedule that fails, by schedules with fewer switches" $ do
+  it "is found from a schedule that fails, by schedules with fewer pre-emptions" $ do
     let first = Seeded 18 -- the eighteenth of those that seed 0 tries
     found <- tryExplore (replaying first) {search = Shrink first} (counting 2)
     either failing (const first) found `shouldBe` Preempting [(5, 2)]
     held <- tryExplore (replaying NonPreemptive) {search = Shrink NonPreemptive} (counting 2)
     either show (show . schedules) held `shouldBe` "1"
-  it "of a deadlock tells who waited" $ do
+  it "of a deadlock names the blocked threads" $ do
     found <- tryExplore (randomly 100) $ \run -> do
       made <- run (both (pure ()) (atomically retry :: Behavior ()))
       case outcome made of
@@ -169,7 +170,7 @@ counterexample = do
         other -> fail (explain other)
     either show show found `shouldSatisfy` ("both: right waits for a transaction" `isInfixOf`)
 
-  it "says so when what it tells did not happen again" $ do
+  it "reports a failure that did not occur again" $ do
     runs <- newIORef (0 :: Int)
     found <- tryExplore (randomly 100) $ \run -> do
       modifyIORef runs (+ 1)
@@ -177,7 +178,7 @@ counterexample = do
       _ <- run (sleep 1)
       when (n == 5) (fail "the fifth run")
     case found of
-      Left c -> show c `shouldSatisfy` \told -> all (`isInfixOf` told) ["the fifth run", "run again, this did not happen"]
+      Left c -> show c `shouldSatisfy` \described -> all (`isInfixOf` described) ["the fifth run", "run again, this did not happen"]
       Right _ -> expectationFailure "it should have been found"
 
 properties :: Spec
@@ -186,14 +187,14 @@ properties = do
   it "simulates only once" $ do
     found <- tryExplore (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
     either (show . reason) show found `shouldBe` "explore: a property simulates only once"
-  it "is told of a run that is none" $ do
+  it "fails when a run reaches the limit of real time" $ do
     found <- tryExplore (randomly 1) {runOptions = defaults {realTimeLimit = 0.1}} $ \run ->
       void (run (mapM_ (evaluate . length . show) [0 :: Int ..]))
     either (show . reason) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
   it "that throws a cancellation ends the exploration" $ do
     end <- ending (schedules <$> explore (randomly 3) (\_ -> throwIO (Cancel "user")))
     end `shouldBe` CancelledBy (show (Cancel "user"))
-  it "of a schedule that does not fit is told why" $ do
+  it "fails with the reason when the schedule does not fit" $ do
     found <- tryExplore (replaying (Preempting [(2, 9)])) $ \run -> do
       made <- run (both (sleep 1) (sleep 1))
       when (points made < 0) (fail "unreachable")

@@ -19,13 +19,13 @@ import Behavior.Sim.Mock
 import Behavior.Time (atomically, now, timeout)
 import Support (Cancel (..), Ending (..), ending, guarded, leavingNothing)
 
--- | Time passes in simulations, but for two milliseconds on real threads.
+-- | Time passes in simulations, except for two milliseconds on real threads.
 spec :: Spec
 spec = guarded $ do
   describe "A scripted action" $ do
     describe "in each call" calls
     describe "that takes time" taking'
-    describe "that is asked to stop" stopped
+    describe "that receives a stop request" stopped
     describe "and its record" records
   describe "A scripted sensor" sensors
   describe "A scripted condition" $ do
@@ -33,18 +33,18 @@ spec = guarded $ do
     describe "that is watched" watched
     describe "that is set by hand" setting
   describe "A mock world" worlds
-  describe "What cannot be" refusals
+  describe "Rejected with an error" refusals
 
--- | What happened in a world, as one reads it.
-story :: Mock -> IO [String]
-story mock = lines . show <$> happened mock
+-- | The lines of a world's record.
+timelineOf :: Mock -> IO [String]
+timelineOf mock = lines . show <$> happened mock
 
--- | How a simulated run ended, and when.
-run :: Show a => Behavior a -> IO (String, Seconds)
-run act = (\r -> (said (outcome r), finished r)) <$> simulate act
+-- | The end of a simulated run, and its time.
+runSimulated :: Show a => Behavior a -> IO (String, Seconds)
+runSimulated act = (\r -> (describedEnd (outcome r), finished r)) <$> simulate act
 
-said :: Show a => Outcome a -> String
-said end = case end of
+describedEnd :: Show a => Outcome a -> String
+describedEnd end = case end of
   Returned a -> "returned " ++ show a
   Failing e -> "failed " ++ show e
   Faulting e -> "faulted " ++ show e
@@ -55,7 +55,7 @@ said end = case end of
 
 calls :: Spec
 calls = do
-  it "does what the script of that call says, and the last script for ever" $ do
+  it "follows the script of that call, and repeats the last script" $ do
     mock <- newMock
     look <- action mock "look" [returning 'a', fails "dark", faults "bug", returning 'b']
     ends <- replicateM 5 (ending look)
@@ -64,7 +64,7 @@ calls = do
       `shouldReturn` concatMap (\end -> [Begins, end]) [Succeeds, Fails "dark", Faults "bug", Succeeds, Succeeds]
     map call . entries <$> happened mock `shouldReturn` [1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
 
-  it "does so exactly, whoever calls at the same time" $ do
+  it "uses each script exactly once, also with concurrent callers" $ do
     mock <- newMock
     ticket <- action mock "ticket" (map returning [1 :: Int ..])
     tickets <- mapConcurrently (const (replicateM 50 ticket)) "12345678"
@@ -74,14 +74,14 @@ calls = do
     counts <- mapConcurrently (const (replicateM 50 count')) "12345678"
     sort (concat counts) `shouldBe` [1 .. 400]
 
-  it "throws exceptions of the user's own, on record as what they are" $ do
+  it "throws the user's exceptions, recorded as failures or faults" $ do
     mock <- newMock
     grasp <- action mock "grasp" [throws (FailedBecause "slippery"), throws (userError "no hand"), succeeds]
     grasp `shouldThrow` (== FailedBecause "slippery")
     grasp `shouldThrow` (isUserError :: IOException -> Bool)
     mock `shouldRecord` (exactly 1 (failureOf "grasp") <> exactly 1 (faultOf "grasp"))
 
-  it "has scripts of its own for each argument" $ do
+  it "has separate scripts for each argument" $ do
     mock <- newMock
     open <- actionOn mock "open" $ \door -> if door == "front" then [fails "locked"] else [fails "stuck", returning door]
     ending (fallbackOver ["front", "back"] open) `shouldReturn` FailedWith "FailedBecause \"stuck\""
@@ -102,19 +102,19 @@ taking' = do
   it "ends when its time is over" $ do
     mock <- newMock
     walk <- action mock "walk" [succeeds `taking` 1 `taking` 1.5, fails "tired" `taking` 0.5]
-    run (walk >> walk) `shouldReturn` ("failed FailedBecause \"tired\"", 3)
-    story mock
+    runSimulated (walk >> walk) `shouldReturn` ("failed FailedBecause \"tired\"", 3)
+    timelineOf mock
       `shouldReturn` ["0.0 s  walk: begins", "2.5 s  walk: done", "2.5 s  walk: begins (call 2)", "3.0 s  walk: fails, tired (call 2)"]
 
-  it "causes what it causes when its time is over, and not when it is stopped" $
+  it "has its effect when its time is over, and not when it is stopped" $
     for_ [(4, "returned True", 4), (6, "returned False", 5)] $ \(limit, end, t) -> do
       mock <- newMock
       low <- condition mock "low" [(0, True)]
       recharge <- action mock "recharge" [succeeds `taking` 5 `causing` set low False]
-      run ((timeout limit recharge ? pure ()) >> reading low) `shouldReturn` (end, t)
+      runSimulated ((timeout limit recharge ? pure ()) >> reading low) `shouldReturn` (end, t)
       mock `shouldRecord` becoming "low" False `comesBefore` successOf "recharge"
 
-  it "ends as its effect does, if that throws" $ do
+  it "throws what its effect throws" $ do
     mock <- newMock
     press <- action mock "press" [succeeds `causing` failWith "no button"]
     ending press `shouldReturn` FailedWith "FailedBecause \"no button\""
@@ -123,16 +123,16 @@ taking' = do
   it "never ends when it hangs, until it is stopped" $ do
     mock <- newMock
     wait <- action mock "wait" [hangs, hangs :: Script ()]
-    run (timeout 3600 wait) `shouldReturn` ("failed TimedOut 3600.0", 3600)
+    runSimulated (timeout 3600 wait) `shouldReturn` ("failed TimedOut 3600.0", 3600)
     mock `shouldRecord` withinSeconds 3600 (interruptionOf "wait")
-    run wait >>= (`shouldBe` "deadlock") . fst
+    runSimulated wait >>= (`shouldBe` "deadlock") . fst
 
 stopped :: Spec
 stopped = do
   let stopping script = do
         mock <- newMock
         act <- action mock "act" [script]
-        end <- run (timeout 1 act)
+        end <- runSimulated (timeout 1 act)
         (,) end . map (\e -> (entryTime e, entryKind e)) . entries <$> happened mock
 
   it "stops at once" $
@@ -151,11 +151,11 @@ stopped = do
     stopping (succeeds `taking` 9 `slowToStop` 1 `faultsStopping` "bug")
       `shouldReturn` (("faulted bug", 2), [(0, Begins), (1, StopRequested), (2, Faults "bug")])
 
-  it "may complete anyway, as late as it would have been" $
+  it "may complete anyway, at the same time as without the request" $
     stopping (completesAnyway (returning 'x' `taking` 9))
       `shouldReturn` (("returned 'x'", 9), [(0, Begins), (1, StopRequested), (9, Succeeds)])
 
-  it "cannot be interrupted once more" $
+  it "cannot be interrupted again" $
     for_ [(hangs `slowToStop` 5, 6, Stops), (completesAnyway (succeeds `taking` 9), 9, Succeeds)] $ \(script, t, end) -> do
       mock <- newMock
       act <- action mock "act" [script]
@@ -166,32 +166,32 @@ stopped = do
       map (\e -> (entryTime e, entryKind e)) . entries <$> happened mock
         `shouldReturn` [(0, Begins), (1, StopRequested), (t, end)]
 
-  it "has not begun when it was asked before" $ do
+  it "does not begin when the request comes first" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate (firstOf [pure (), sleep 0.5 >> act])
     mock `shouldRecord` never (startOf "act")
 
-  it "is slow also where its caller is masked" $ do
+  it "completes where its caller is masked uninterruptibly" $ do
     mock <- newMock
     act <- action mock "act" [succeeds `taking` 3]
-    run (timeout 1 (uninterruptibleMask_ act)) `shouldReturn` ("failed TimedOut 1.0", 3)
+    runSimulated (timeout 1 (uninterruptibleMask_ act)) `shouldReturn` ("failed TimedOut 1.0", 3)
     mock `shouldRecord` never (interruptionOf "act")
 
 records :: Spec
 records = do
-  it "says that it succeeded if and only if it returned, in every schedule" $
+  it "contains a success if and only if the action returned, under every schedule" $
     for_ [1 .. 300] $ \seed -> do
       mock <- newMock
       act <- action mock "act" [returning () `taking` 1, succeeds, completesAnyway (succeeds `taking` 2)]
       returned <- newIORef (0 :: Int)
-      -- Masked: nothing comes between the return and the counting.
+      -- Masked, so that no exception arrives between the return and the counting.
       let counting = replicateM_ 3 . mask_ $ (act >> readIORef returned >>= writeIORef returned . (+ 1))
       _ <- simulateWith defaults {scheduled = Seeded seed} (timeout 1 counting ? sleep 1)
       n <- readIORef returned
       mock `shouldRecord` exactly n (successOf "act")
 
-  it "says of each call that began how it ended, in every schedule" $
+  it "contains the end of each call that began, under every schedule" $
     for_ [1 .. 100] $ \seed -> do
       mock <- newMock
       act <- action mock "act" [succeeds, succeeds `taking` 1 `slowToStop` 1, fails "x"]
@@ -207,42 +207,42 @@ records = do
     ran <- simulate (act ? Signal.waitUntil (signal low))
     [(Sim.at step, text) | step <- Sim.steps ran, Sim.Note text <- [Sim.did step]]
       `shouldBe` [(0, "act: begins"), (2, "act: fails, x"), (2, "low: becomes True")]
-    story mock `shouldReturn` ["0.0 s  low: is False", "0.0 s  act: begins", "1.0 s  low: becomes True", "2.0 s  act: fails, x"]
+    timelineOf mock `shouldReturn` ["0.0 s  low: is False", "0.0 s  act: begins", "1.0 s  low: becomes True", "2.0 s  act: fails, x"]
 
 sensors :: Spec
 sensors = do
-  it "gives what the script of that reading says" $ do
+  it "follows the script of that reading" $ do
     mock <- newMock
     camera <- sensor mock "camera" [returning 1, fails "dark", returning (2 :: Int)]
     replicateM 4 (ending camera) `shouldReturn` [Gave 1, FailedWith "FailedBecause \"dark\"", Gave 2, Gave 2]
 
-  it "has on record what it reads only when that is something else" $ do
+  it "records a reading only when its value is different" $ do
     mock <- newMock
     range <- sensor mock "range" (map returning [9, 9, 8, 8, 8, 9, 5 :: Int])
     _ <- simulate (Signal.waitUntil ((== 5) <$> Signal.polling 1 range))
-    story mock
+    timelineOf mock
       `shouldReturn` ["0.0 s  range: becomes 9", "2.0 s  range: becomes 8", "5.0 s  range: becomes 9", "6.0 s  range: becomes 5"]
 
-  it "can be late, and dead" $ do
+  it "can be late, and can fault" $ do
     mock <- newMock
     range <- sensor mock "range" [returning 'a' `taking` 3, faults "broken"]
-    run (range >> range) `shouldReturn` ("faulted broken", 3)
+    runSimulated (range >> range) `shouldReturn` ("faulted broken", 3)
     mock `shouldRecord` eventually (faultOf "range") <> becoming "range" 'a' `comesBefore` faultOf "range"
 
 polled :: Spec
 polled = do
-  it "has at each time the value that it then has" $ do
+  it "gives its value at each time" $ do
     mock <- newMock
     level <- condition mock "level" [(0, 'a'), (1, 'b'), (2, 'c')]
-    run (sequence [reading level, sleep 1 >> reading level, sleep 0.5 >> reading level, sleep 9 >> reading level])
+    runSimulated (sequence [reading level, sleep 1 >> reading level, sleep 0.5 >> reading level, sleep 9 >> reading level])
       `shouldReturn` ("returned \"abbc\"", 10.5)
 
-  it "is on record at the times when it was due, whoever looked, or nobody" $ do
+  it "is recorded at the times of its changes, whether it is read or not" $ do
     mock <- newMock
     _ <- condition mock "level" [(0, 'a'), (1, 'b'), (2, 'c'), (9, 'd')]
     act <- action mock "act" [succeeds `taking` 1.5]
     _ <- simulate (act >> act)
-    story mock
+    timelineOf mock
       `shouldReturn` [ "0.0 s  level: is 'a'"
                      , "0.0 s  act: begins"
                      , "1.0 s  level: becomes 'b'"
@@ -256,12 +256,12 @@ polled = do
     for_ [(0, none), (1, "returned 'a'"), (2, none)] $ \(t, end) -> do
       mock <- newMock
       level <- partialCondition mock "level" [(1, Just 'a'), (2, Nothing)]
-      run (begin mock >> sleep t >> reading level) `shouldReturn` (end, t)
+      runSimulated (begin mock >> sleep t >> reading level) `shouldReturn` (end, t)
 
   it "can change for ever" $ do
     mock <- newMock
     tick <- condition mock "tick" (zip (iterate (+ 1) 0) (cycle "ab"))
-    run (begin mock >> sleep 1001 >> reading tick) `shouldReturn` ("returned 'b'", 1001)
+    runSimulated (begin mock >> sleep 1001 >> reading tick) `shouldReturn` ("returned 'b'", 1001)
     count (becoming "tick" 'a') <$> happened mock `shouldReturn` 501
  where
   none = "failed FailedBecause \"level has no value\""
@@ -273,8 +273,8 @@ watched = do
     low <- condition mock "low" [(0, False), (5, True), (8, False)]
     tidy <- action mock "tidy" [hangs `slowToStop` 1, returning 'x']
     recharge <- action mock "recharge" [succeeds `taking` 4]
-    run (Signal.monitor (signal low) recharge tidy) `shouldReturn` ("returned 'x'", 10)
-    story mock
+    runSimulated (Signal.monitor (signal low) recharge tidy) `shouldReturn` ("returned 'x'", 10)
+    timelineOf mock
       `shouldReturn` [ " 0.0 s  low: is False"
                      , " 0.0 s  tidy: begins"
                      , " 5.0 s  low: becomes True"
@@ -287,7 +287,7 @@ watched = do
                      , "10.0 s  tidy: done (call 2)"
                      ]
 
-  it "is never out of date when it is looked at anew, in any schedule" $
+  it "is up to date when it is read again, under every schedule" $
     for_ [1 .. 100] $ \seed -> do
       mock <- newMock
       low <- condition mock "low" [(0, True), (1, False), (3, True)]
@@ -297,12 +297,12 @@ watched = do
       finished r `shouldBe` 2.5
       mock `shouldRecord` exactly 1 (startOf "recharge")
 
-  it "waits for its first value, and fails its operator when that is lost" $ do
+  it "waits for its first value, and fails its operator when it has no value any more" $ do
     mock <- newMock
     level <- partialCondition mock "level" [(1, Just 'a'), (2, Nothing)]
-    run (Signal.waitUntil ((== 'b') <$> signal level)) `shouldReturn` ("failed FailedBecause \"level has no value any more\"", 2)
+    runSimulated (Signal.waitUntil ((== 'b') <$> signal level)) `shouldReturn` ("failed FailedBecause \"level has no value any more\"", 2)
 
-  it "starts no thread that outlives its operator, nor any when it will not change" $ do
+  it "starts no thread that outlives its operator, and none when it will not change" $ do
     mock <- newMock
     low <- condition mock "low" [(0, False), (3600, True)]
     leavingNothing (Signal.rSelect (signal low) (pure 'l') (pure 'r')) `shouldReturn` 'r'
@@ -313,41 +313,41 @@ watched = do
     other <- simulate (Signal.waitUntil (signal cold))
     [Sim.label step | step <- Sim.steps other, Sim.did step == Sim.Starts] `shouldContain` [Label "waitUntil" "clock"]
 
-  it "works when the clock of the world was started late, whatever the rounding" $
+  it "works when the clock of the world was started late, with any rounding" $
     for_ [0.1, 0.7, 1 / 3, 1e6 + 0.1] $ \t -> do
       mock <- newMock
       low <- condition mock "low" [(0, False), (0.1, False), (0.2, False), (0.3, True)]
-      run (sleep t >> begin mock >> Signal.waitUntil (signal low)) `shouldReturn` ("returned ()", t + 0.3)
+      runSimulated (sleep t >> begin mock >> Signal.waitUntil (signal low)) `shouldReturn` ("returned ()", t + 0.3)
 
 setting :: Spec
 setting = do
-  it "is what it was set to, until its next change" $ do
+  it "has the value that was set, until its next change" $ do
     mock <- newMock
     door <- condition mock "door" [(0, "shut"), (2, "ajar")]
-    run (sequence [set door "open" >> reading door, sleep 1 >> reading door, sleep 1 >> reading door])
+    runSimulated (sequence [set door "open" >> reading door, sleep 1 >> reading door, sleep 1 >> reading door])
       `shouldReturn` ("returned [\"open\",\"open\",\"ajar\"]", 2)
 
-  it "wakes who watches it, and a value that stays is no news on record" $ do
+  it "wakes its watchers, and records only values that are different" $ do
     mock <- newMock
     wet <- condition mock "wet" [(0, False)]
-    run (Signal.waitUntil (signal wet) `both` (set wet False >> sleep 1 >> set wet True)) `shouldReturn` ("returned ()", 1)
+    runSimulated (Signal.waitUntil (signal wet) `both` (set wet False >> sleep 1 >> set wet True)) `shouldReturn` ("returned ()", 1)
     mock `shouldRecord` exactly 2 (anyOf [becoming "wet" False, becoming "wet" True])
 
   it "can lose its value" $ do
     mock <- newMock
     wet <- condition mock "wet" [(0, False)]
-    run (Signal.waitUntil (signal wet) `both` (sleep 1 >> clear wet))
+    runSimulated (Signal.waitUntil (signal wet) `both` (sleep 1 >> clear wet))
       `shouldReturn` ("failed FailedBecause \"wet has no value any more\"", 1)
 
 worlds :: Spec
 worlds = do
-  it "has a clock that starts with the first that happens" $ do
+  it "has a clock that starts with the first record entry" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate (sleep 5 >> act >> sleep 1 >> note mock "over")
     map entryTime . entries <$> happened mock `shouldReturn` [0, 0, 1]
 
-  it "has one that can be started before" $ do
+  it "has a clock that can be started before that" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate (begin mock >> sleep 5 >> begin mock >> act)
@@ -364,7 +364,7 @@ worlds = do
     mock `shouldRecord` becoming "low" True `comesBefore` successOf "act"
     map entryTime . filter ((== "low") . subject) . entries <$> happened mock `shouldReturn` [0, 0.001]
 
-  it "says why a claim does not hold" $ do
+  it "reports why a claim does not hold" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate act
@@ -383,25 +383,25 @@ refusals = do
     open <- actionOn mock "open" (\_ -> [] :: [Script ()])
     open 'x' `refused` "action \"open 'x'\": at least one script is needed; the last one repeats for ever"
 
-  it "is a length of time that is none" $ do
+  it "is an invalid duration" $ do
     mock <- newMock
     action mock "act" [succeeds, succeeds `taking` (-1)] `refused` "action \"act\": a duration is zero or more seconds, not -1.0"
     action mock "act" [succeeds `taking` (0 / 0)] `refused` "action \"act\": a duration is zero or more seconds, not NaN"
     action mock "act" [succeeds `slowToStop` (-1)] `refused` "action \"act\": a duration is zero or more seconds, not -1.0"
 
-  it "is a change at a time that is none, or that is over" $ do
+  it "is a change at an invalid time, or out of order" $ do
     mock <- newMock
     let allowed = "condition \"low\": the times of the changes start from zero and increase; "
     condition mock "low" [(-1, True)] `refused` (allowed ++ "-1.0 is no such time")
     condition mock "low" [(0 / 0, True)] `refused` (allowed ++ "NaN is no such time")
     condition mock "low" [(0, True), (2, False), (2, True)] `refused` (allowed ++ "2.0 must not come after 2.0")
 
-  it "are two things of one name" $ do
+  it "is a name that is used twice" $ do
     mock <- newMock
     _ <- action mock "act" [succeeds]
     condition mock "act" [(0, 'x')] `refused` "condition \"act\": something else in this world has this name already"
 
-  it "is a claim about what is not there" $ do
+  it "is a claim about an unknown name" $ do
     mock <- newMock
     _ <- action mock "act" [succeeds]
     (mock `shouldRecord` never (startOf "atc")) `shouldThrow` \(BrokenClaim why) -> "called \"atc\", only \"act\"" `isInfixOf` why

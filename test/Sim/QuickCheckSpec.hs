@@ -19,21 +19,21 @@ import Support
 spec :: Spec
 spec = guarded $ do
   describe "A property under schedules" searches
-  describe "Of a property under schedules QuickCheck's verdict stands:" verdicts
+  describe "QuickCheck's verdict on a property under schedules is kept:" verdicts
   describe "Several schedules for each test" several
 
 searches :: Spec
 searches = do
-  prop "holds, whatever is generated" $
+  prop "holds for all generated values" $
     forAll durations $ \(s, t) -> underSchedules $ \simulating -> do
       run <- simulating (both (sleep s) (sleep t))
       pure (finished run === max s t)
-  it "does not hold if it does not under one of them" $ do
+  it "does not hold if it fails under one of them" $ do
     result <- quickCheckWithResult thorough counting
     output result `shouldContain` "shrunk to one switch"
     output result `shouldContain` "to see it again: explore (replaying (Preempting [("
     output result `shouldContain` "1 /= 2"
-  it "may throw instead" $ do
+  it "may throw instead of being false" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating -> do
       _ <- simulating (sleep 1)
       throwIO (Fault "this is not to be") :: IO ()
@@ -56,22 +56,22 @@ searches = do
 
 verdicts :: Spec
 verdicts = do
-  it "one that always discards gives up" $ do
+  it "a property that always discards gives up" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating ->
       simulating (sleep 1) >> pure (False ==> True)
     output result `shouldContain` "Gave up! Passed only 0 tests"
-  it "one that throws a discard gives up" $ do
+  it "a property that throws a discard gives up" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating ->
       simulating (sleep 1) >> (discard :: IO Bool)
     output result `shouldContain` "Gave up! Passed only 0 tests"
-  it "one that is expected to fail, and never does, fails" $ do
+  it "a property that is expected to fail, and never does, fails" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating ->
       simulating (sleep 1) >> pure (expectFailure True)
     output result `shouldContain` "*** Failed! Passed 500 tests (expected failure)"
-  it "one that is expected to fail, and does, holds" $ do
+  it "a property that is expected to fail, and does, holds" $ do
     result <- quickCheckWithResult thorough . underSchedules $ fmap expectFailure . count
     output result `shouldContain` "+++ OK, failed as expected"
-  it "one that covers less than it should fails" $ do
+  it "a property with insufficient coverage fails" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating -> do
       run <- simulating (sleep 1)
       pure (checkCoverage (cover 50 (finished run > 1) "late" True))
@@ -82,23 +82,23 @@ verdicts = do
       pure (label "labelled" (tabulate "when" [show (finished run)] True))
     output result `shouldContain` "passed 500 tests (100.0% labelled)"
     output result `shouldContain` "when (500 in total):\n100.0% 1.0"
-  it "what is generated inside is shrunk" $ do
+  it "values that are generated inside are shrunk" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating -> do
       _ <- simulating (sleep 1)
       pure (forAllShrink (choose (0, 1000000)) shrink (\n -> (n :: Int) < 20))
     drop 3 (lines (output result)) `shouldBe` ["to see it again: explore (replaying (Preempting []))", "20"]
-  it "what is generated inside may be simulated, and what is told is what was shrunk" $ do
+  it "values that are generated inside can be simulated, and the shrunk run is reported" $ do
     result <- quickCheckWithResult quiet . underSchedules $ \simulating ->
       pure . forAllShrink (choose (0, 1000)) shrink $ \n -> ioProperty $ do
         run <- simulating (sleep (fromIntegral (n :: Int)))
         pure (finished run < 20)
     drop 2 (lines (output result))
       `shouldBe` ["     0.000 s  0 main  sleeps until 20.000 s", "to see it again: explore (replaying (Preempting []))", "20"]
-  it "nothing is shrunk if it is told to shrink nothing" $ do
+  it "nothing is shrunk if maxShrinks is 0" $ do
     result <- quickCheckWithResult thorough {maxShrinks = 0} counting
     numShrinks result `shouldBe` 0
     output result `shouldContain` "under the schedule Seeded"
-  it "what is generated inside grows with the tests" $ do
+  it "values that are generated inside grow with the tests" $ do
     sizes <- newIORef []
     quickCheckWith quiet {maxSuccess = 100} . underSchedules $ \simulating -> do
       _ <- simulating (sleep 1)
@@ -110,7 +110,7 @@ several = do
   it "are tried" $ do
     result <- quickCheckWithResult quiet {maxSuccess = 1} (underSchedulesOf 2000 count)
     isSuccess result `shouldBe` False
-  it "are decided by the first that is discarded" $ do
+  it "are discarded with the first that is discarded" $ do
     tried <- newIORef (0 :: Int)
     result <- quickCheckWithResult quiet {maxSuccess = 1, maxDiscardRatio = 1} . underSchedulesOf 10 $ \simulating -> do
       _ <- simulating (sleep 1)
@@ -130,14 +130,14 @@ several = do
 quiet :: Args
 quiet = stdArgs {chatty = False, maxSuccess = 500}
 
--- | One schedule in sixty or so makes 'count' fail.
+-- | About one schedule in sixty makes 'count' fail.
 thorough :: Args
 thorough = quiet {maxSuccess = 2000}
 
 counting :: Property
 counting = underSchedules count
 
--- | Two count to two, and forget each other.
+-- | Two branches increment a counter, but read and write it in separate transactions.
 count :: (Behavior () -> IO (Run ())) -> IO Property
 count simulating = do
   counter <- newTVarIO (0 :: Int)

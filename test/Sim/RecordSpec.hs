@@ -19,12 +19,12 @@ spec = guarded $ do
     describe "of universality" universality
     describe "of precedence" precedence
     describe "of response" response
-    describe "of many things" conjunction
+    describe "of several claims" conjunction
     describe "that does not hold" refutation
   describe "Moments" moments
-  describe "What goes on for a while" whiles
+  describe "Intervals" whiles
 
--- | A line about something that has no arguments and is called once.
+-- | An entry of a subject without arguments, in its first call.
 line :: Seconds -> String -> EntryKind -> RecordEntry
 line t who = RecordEntry t who "" 1
 
@@ -47,14 +47,14 @@ day =
     , line 12 "help!" Noted
     ]
 
--- | Each of these holds, or does not.
+-- | Each of the claims holds, or none does.
 hold, doNotHold :: [Claim] -> Expectation
 hold claims = for_ claims $ \claim -> verdict claim day `shouldBe` Right ()
 doNotHold claims = for_ claims $ \claim -> day `shouldNotSatisfy` holds claim
 
 reads' :: Spec
 reads' = do
-  it "reads as a timeline, one line an entry" $
+  it "is shown as a timeline, with a line for each entry" $
     lines (show day)
       `shouldBe` [ " 0.0 s  low: is False"
                  , " 1.0 s  drive: begins"
@@ -69,56 +69,56 @@ reads' = do
                  , "12.0 s  help!"
                  ]
 
-  it "shows times without the noise of their sums" $
+  it "shows times without rounding errors" $
     show (Record ["a"] [line (0.1 + 0.2) "a" Begins]) `shouldBe` "0.3 s  a: begins\n"
 
 existence :: Spec
 existence = do
-  it "holds of what is on record" $
+  it "holds for an entry of the record" $
     hold [eventually (startOf "charge"), eventually (noted "help!"), eventually (failureOf "drive")]
 
-  it "does not hold of what is not" $
+  it "does not hold without such an entry" $
     doNotHold [eventually (startOf "sing"), eventually (faultOf "drive"), eventually (noted "help")]
 
-  it "with a limit holds up to the limit, itself included" $ do
+  it "with a limit holds up to and including the limit" $ do
     hold [withinSeconds 5 (startOf "charge"), withinSeconds 12 (failureOf "drive")]
     doNotHold [withinSeconds 4.9 (startOf "charge"), withinSeconds 100 (startOf "sing")]
 
-  it "is not broken by the noise of sums" $
+  it "holds despite rounding errors" $
     Record ["a"] [line (0.1 + 0.2) "a" Begins] `shouldSatisfy` holds (withinSeconds 0.3 (startOf "a"))
 
-  it "refuses a limit that is none" $
+  it "rejects an invalid limit" $
     for_ [(-1, "-1.0"), (0 / 0, "NaN")] $ \(limit, shown) ->
       evaluate (holds (whenever (startOf "sing") (withinSeconds limit (startOf "sing"))) day)
         `shouldThrow` (== ErrorCall ("withinSeconds: a limit is zero or more seconds, not " ++ shown))
 
 absence :: Spec
 absence = do
-  it "holds of what is not on record" $
+  it "holds without such an entry" $
     hold [never (startOf "sing"), never (faultOf "drive")]
-  it "does not hold of what is" $
+  it "does not hold for an entry of the record" $
     doNotHold [never (startOf "charge"), never (anyOf [startOf "sing", startOf "charge"])]
 
 number :: Spec
 number =
-  it "counts" $ do
+  it "holds for the exact number of entries" $ do
     hold [exactly 2 (startOf "drive"), exactly 0 (startOf "sing"), exactly 1 (successOf "charge")]
     doNotHold [exactly 1 (startOf "drive"), exactly 3 (startOf "drive")]
     count (endOf "drive") day `shouldBe` 2
 
 universality :: Spec
 universality = do
-  it "holds when it goes on at everything that comes after" $
+  it "holds when the interval includes all later entries" $
     hold [whenever (failureOf "drive") (always (being "low" False))]
-  it "does not hold when it pauses" $
+  it "does not hold when the interval is interrupted" $
     doNotHold [always (being "low" False), always (running "drive"), whenever (startOf "charge") (always (being "low" True))]
-  it "is not asked of a world that is being set up" $
+  it "disregards the entries that set the world up" $
     Record ["a", "b"] [line 0 "a" (Is "1"), line 0 "b" (Is "2"), line 1 "a" (Becomes "3")]
       `shouldSatisfy` holds (always (being "b" (2 :: Int)))
 
 precedence :: Spec
 precedence = do
-  it "holds when the first comes first, or the second never" $
+  it "holds when the first comes first, or the second never comes" $
     hold
       [ startOf "drive" `comesBefore` startOf "charge"
       , interruptionOf "drive" `comesBefore` endOf "drive"
@@ -133,7 +133,7 @@ precedence = do
 
 response :: Spec
 response = do
-  it "is asked of all that comes after, each time" $ do
+  it "is about all later entries, each time" $ do
     hold
       [ whenever (becoming "low" True) (eventually (startOf "charge"))
       , whenever (becoming "low" True) (withinSeconds 1 (startOf "charge"))
@@ -158,7 +158,7 @@ conjunction =
 
 refutation :: Spec
 refutation = do
-  it "says what does not hold, and shows the lines that prove it" $
+  it "is reported with the entries that disprove it" $
     verdict (whenever (becoming "low" True) (withinSeconds 0.5 (startOf "charge"))) day
       `shouldBe` Left
         ( unlines
@@ -176,7 +176,7 @@ refutation = do
             ]
         )
 
-  it "shows how the record ends when something never came" $
+  it "is reported with the end of the record when an entry never came" $
     verdict (eventually (startOf "sing")) day
       `shouldBe` Left
         ( unlines
@@ -191,25 +191,25 @@ refutation = do
             ]
         )
 
-  it "is every one about a name that nobody bears" $
+  it "is each claim about an unknown name" $
     for_ [never (startOf "chrage"), startOf "chrage" `comesBefore` startOf "sing", never (startOf "sing" `during` being "lwo" True)] $
       \claim -> verdict claim day `shouldSatisfy` either ("Nothing in this world is called" `isInfixOf`) (const False)
 
 moments :: Spec
 moments = do
-  it "are those of the one argument, or of any" $ do
+  it "are those of one argument, or of any argument" $ do
     let doors = Record ["open"] [RecordEntry 0 "open" "\"front\"" 1 Begins, RecordEntry 1 "open" "\"front\"" 1 (Fails "locked"), RecordEntry 1 "open" "\"back\"" 1 Begins]
     count (startOf "open") doors `shouldBe` 2
     count (startOf "open \"front\"") doors `shouldBe` 1
     doors `shouldSatisfy` holds (never (startOf "open \"cellar\""))
 
-  it "are not those of another whose name begins alike" $
+  it "are not those of another subject with the same prefix" $
     count (startOf "open") (Record ["open", "open door"] [line 0 "open door" Begins]) `shouldBe` 0
 
-  it "joined are whichever of these, each once" $
+  it "of anyOf are those of each alternative, counted once" $
     count (anyOf [startOf "drive", startOf "charge", startOf "drive"]) day `shouldBe` 3
 
-  it "can be those while something goes on, or while it does not" $ do
+  it "can be restricted to an interval, or to the time outside of it" $ do
     count (startOf "drive" `outside` being "low" True) day `shouldBe` 2
     count (startOf "charge" `during` being "low" True) day `shouldBe` 1
     count (startOf "charge" `during` running "drive") day `shouldBe` 0
@@ -230,9 +230,9 @@ whiles = do
     let rows = [RecordEntry 0 "a" "" 1 Begins, RecordEntry 1 "a" "" 2 Begins, RecordEntry 2 "a" "" 1 Succeeds, RecordEntry 3 "a" "" 3 Begins, RecordEntry 4 "a" "" 2 Stops]
     count (running "a" `overlapping` running "a") (Record ["a"] rows) `shouldBe` 2
 
-  it "go on through the cleanup" $
+  it "include the cleanup" $
     count (interruptionOf "drive" `during` running "drive") day `shouldBe` 1
 
-  it "end when the value is lost" $ do
+  it "end when the condition loses its value" $ do
     let rows = [line 0 "x" (Becomes "1"), line 1 "x" LosesValue, line 2 "a" Begins]
     count (startOf "a" `during` being "x" (1 :: Int)) (Record ["x", "a"] rows) `shouldBe` 0

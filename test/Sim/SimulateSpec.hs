@@ -32,10 +32,10 @@ spec = guarded $ do
     describe "ends" outcomes
     describe "takes virtual time" times
     describe "is the same for the same schedule" deterministic
-    describe "delivers a cancellation by GHC's rule" delivery
-  describe "A mistake is told:" mistakes
+    describe "raises a cancellation by GHC's rule" delivery
+  describe "Reported is" mistakes
   describe "When the run has ended," unwinding
-  describe "Beside other runs," beside
+  describe "Concurrently with other runs," beside
 
 -- | How a run ended, in words.
 ended :: Show a => Run a -> String
@@ -58,29 +58,29 @@ outcomes = do
 
 times :: Spec
 times = do
-  it "from 0, and none of the real" $ do
+  it "from 0, independent of real time" $ do
     run <- simulate (now >>= \t -> sleep 86400 >> (,) t <$> now)
     ended run `shouldBe` "returned (0.0,86400.0)"
     finished run `shouldBe` 86400
-  it "which is the longest of what runs at once" $
+  it "which is that of the longest concurrent branch" $
     finished <$> simulate (both (sleep 3) (sleep 2 >> sleep 2)) `shouldReturn` 4
-  it "and none for what takes none" $
+  it "and none if no branch sleeps" $
     finished <$> simulate (both (pure ()) (atomically (pure ()))) `shouldReturn` 0
-  it "and sleepers of the same moment tie" $ do
-    book <- newIORef ([] :: [String])
+  it "and sleepers that are due at the same time wake in any order" $ do
+    logged <- newIORef ([] :: [String])
     forM_ [1 .. 40] $ \seed -> do
       order <- newTVarIO []
       let arm name = sleep 1 >> atomically (modifyTVar' order (name :))
       _ <- simulateWith defaults {scheduled = Seeded seed} (both (arm 'l') (arm 'r'))
-      readTVarIO order >>= \o -> modifyIORef book (o :)
-    orders <- readIORef book
+      readTVarIO order >>= \o -> modifyIORef logged (o :)
+    orders <- readIORef logged
     nub orders `shouldMatchList` ["lr", "rl"]
-  it "up to the end that is set" $ do
+  it "up to endAt" $ do
     run <- simulateWith defaults {endAt = 10} (forever (sleep 3) :: Behavior ())
     explain (outcome run) `shouldContain` "the end that was set"
     finished run `shouldBe` 10
 
--- | A small mission with everything in it.
+-- | A small mission with several operators.
 mission :: Behavior Int
 mission = do
   battery <- newTVarIO (30 :: Int)
@@ -93,61 +93,61 @@ mission = do
 
 deterministic :: Spec
 deterministic = do
-  it "to the step" $
+  it "in each step" $
     forM_ [1 .. 50] $ \seed -> do
       let options = defaults {scheduled = Seeded seed, detailed = True}
       one <- simulateWith options mission
       other <- simulateWith options mission
       (ended one, steps one, schedule one) `shouldBe` (ended other, steps other, schedule other)
-  it "and the schedule that a run tells of replays it" $
+  it "and the schedule of a run replays it" $
     forM_ [1 .. 50] $ \seed -> do
       one <- simulateWith defaults {scheduled = Seeded seed, detailed = True} mission
       other <- simulateWith defaults {scheduled = schedule one, detailed = True} mission
       (ended one, steps one, schedule one) `shouldBe` (ended other, steps other, schedule other)
-  it "and another for another" $ do
+  it "and different for different schedules" $ do
     runs <- mapM (\seed -> simulateWith defaults {scheduled = Seeded seed} mission) [1 .. 50]
     length (nub (map (show . schedule) runs)) `shouldSatisfy` (> 25)
-  it "also when garbage is collected meanwhile" $ do
-    -- Whoever waits for its turn is not taken for deadlocked.
+  it "also during garbage collections" $ do
+    -- The runtime system must not detect a deadlock for a thread that waits for its turn.
     run <- simulate (both (forM_ [1 .. 5 :: Int] (\_ -> performMajorGC >> sleep 1)) (sleep 3 >> sleep 4))
     ended run `shouldBe` "returned ()"
 
--- | What a branch in this state has done when another branch has failed just before.
+-- | What a branch in a masking state does after another branch has failed.
 delivery :: Spec
 delivery = do
   it "unmasked: at any operation" $ reached id (sleep 1) `shouldReturn` []
-  it "masked: not at one that need not wait" $
+  it "masked: not at an operation that need not block" $
     reached mask_ (atomically (pure ())) `shouldReturn` ["went on"]
-  it "masked: at one that waits" $ reached mask_ (atomically retry) `shouldReturn` []
-  it "masked: at one that sleeps" $ reached mask_ (sleep 1) `shouldReturn` []
+  it "masked: at an operation that blocks" $ reached mask_ (atomically retry) `shouldReturn` []
+  it "masked: at an operation that sleeps" $ reached mask_ (sleep 1) `shouldReturn` []
   it "masked uninterruptibly: never" $
     reached uninterruptibleMask_ (sleep 1) `shouldReturn` ["went on"]
-  it "after the last operation: what it has done is done" $ do
-    book <- newIORef []
-    _ <- simulate (parallel (modifyIORef book ("went on" :)) (failed :: Behavior ())) 
-    readIORef book `shouldReturn` ["went on"]
+  it "after the last operation: that keeps its effect" $ do
+    logged <- newIORef []
+    _ <- simulate (parallel (modifyIORef logged ("went on" :)) (failed :: Behavior ())) 
+    readIORef logged `shouldReturn` ["went on"]
   it "to a thread that has not begun: before its first step" $ do
-    book <- newIORef []
-    -- The second thread is the third to run, when the first has failed.
+    logged <- newIORef []
+    -- The second branch runs after the first has failed.
     void . simulateWith defaults {scheduled = Preempting [(4, 1), (5, 1), (6, 0)]} $
-      parallel (failed :: Behavior ()) (modifyIORef book ("began" :))
-    began <- readIORef book
+      parallel (failed :: Behavior ()) (modifyIORef logged ("began" :))
+    began <- readIORef logged
     began `shouldSatisfy` (`elem` [[], ["began"]])
  where
-  -- The operation is asked to stop at the time 0 at which it begins.
+  -- The stop is requested at the time 0 at which the operation begins.
   reached masked operation = do
-    book <- newIORef []
-    asked <- newTVarIO False
+    logged <- newIORef []
+    requested <- newTVarIO False
     void . simulate $
       parallel
-        (masked (uninterruptibleMask_ (atomically (readTVar asked >>= STM.check)) >> operation >> modifyIORef book ("went on" :)))
-        (atomically (writeTVar asked True) >> (failed :: Behavior ()))
+        (masked (uninterruptibleMask_ (atomically (readTVar requested >>= STM.check)) >> operation >> modifyIORef logged ("went on" :)))
+        (atomically (writeTVar requested True) >> (failed :: Behavior ()))
         ? pure ()
-    readIORef book
+    readIORef logged
 
 mistakes :: Spec
 mistakes = do
-  it "a deadlock, and who waits for what" $ do
+  it "a deadlock, and what each thread waits for" $ do
     run <- simulate (both (atomically retry :: Behavior ()) (sleep (1 / 0)))
     lines (explain (outcome run))
       `shouldBe` [ "deadlock: every thread waits, and nothing in the simulation will wake one"
@@ -162,7 +162,7 @@ mistakes = do
   it "a livelock of one thread" $ do
     run <- simulateWith defaults {livelockLimit = 3000} (forever checkpoint :: Behavior ())
     explain (outcome run) `shouldContain` "livelock"
-  describe "who waits outside of the library," $ do
+  describe "a thread that blocks outside of the library," $ do
     outside "takeMVar" (newEmptyMVar >>= takeMVar) "use atomically and a TMVar"
     outside "threadDelay" (threadDelay 10000000) "use atomically and a TMVar, sleep"
     outside "retry" (STM.atomically retry) "use Behavior.Time.atomically"
@@ -170,16 +170,16 @@ mistakes = do
     outside "async" (async (threadDelay 10000000) >>= wait) "use Behavior.Time.atomically, parallel, both, fork"
     outside "race" (void (race (threadDelay 10000000) (threadDelay 10000000))) "use "
     outside "forkIO" (newEmptyMVar >>= \box -> forkIO (threadDelay 10000000 >> putMVar box ()) >> takeMVar box) "forkIO and a wait for it"
-  it "that a cleanup throws to who waits for its end: both are named" $ do
+  it "a cleanup that throws to the thread that waits for its end: both threads are named" $ do
     run <- simulate $ do
       me <- myThreadId
       parallel (sleep 1) (sleep 2 `finally` throwTo me (userError "e-stop"))
     let text = explain (outcome run)
     text `shouldContain` "parallel: right waited outside of the simulation, for another thread to hear an exception"
     text `shouldContain` "\n  main waits for its branches: parallel: right"
-  it "that something outside woke somebody" $ do
-    -- It comes true at the fifth look, by when nothing in the simulation can make it so. (A
-    -- thread outside might be too early for that, or too late.)
+  it "a thread that is woken from outside" $ do
+    -- The transaction succeeds in its fifth run, when nothing in the simulation can change its
+    -- result. (A thread outside of the simulation might be too early for that, or too late.)
     looks <- newIORef (0 :: Int)
     let comesTrue = unsafeIOToSTM (atomicModifyIORef' looks (\n -> (n + 1, n >= 4))) >>= STM.check
     run <- simulate (atomically comesTrue)
@@ -187,7 +187,7 @@ mistakes = do
   it "a computation without end" $ do
     run <- simulateWith defaults {realTimeLimit = 0.1} (mapM_ (evaluate . length . show) [0 :: Int ..])
     explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
-  it "a loop that never allocates, if it is compiled so that it can be interrupted" $ do
+  it "a loop that never allocates, if it is compiled with -fno-omit-yields" $ do
     run <- simulateWith defaults {realTimeLimit = 0.1} (busy 0)
     explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
   it "a simulation inside of a simulation" $ do
@@ -195,12 +195,12 @@ mistakes = do
     ended run `shouldContain` "simulate: a simulation inside of a simulation"
   describe "a schedule that does not fit" $ do
     let small = both (sleep 1) (sleep 2)
-        misfit switches text = do
-          run <- simulateWith defaults {scheduled = Preempting switches} small
+        mismatch preemptions text = do
+          run <- simulateWith defaults {scheduled = Preempting preemptions} small
           explain (outcome run) `shouldContain` ("the schedule does not fit this behaviour: " ++ text)
-    it "as no such thread can run" $ misfit [(3, 7)] "at point 3 thread 7 cannot run; those that can: [1,2]"
-    it "as the run is shorter" $ misfit [(300, 1)] "the run ended before point 300"
-    it "as only one could run there" $ misfit [(1, 1)] "the run ended before point 1"
+    it "because the thread cannot run there" $ mismatch [(3, 7)] "at point 3 thread 7 cannot run; those that can: [1,2]"
+    it "because the run is shorter" $ mismatch [(300, 1)] "the run ended before point 300"
+    it "because only one thread can run there" $ mismatch [(1, 1)] "the run ended before point 1"
  where
   outside name act advice = it (name ++ ", and what to use instead") $ do
     run <- simulate (parallel act (sleep 1))
@@ -210,32 +210,32 @@ mistakes = do
 
 unwinding :: Spec
 unwinding = do
-  it "after a deadlock, every cleanup has run, one at a time" $ do
-    book <- newIORef []
+  it "by a deadlock, every cleanup has run, one at a time" $ do
+    logged <- newIORef []
     inside <- newIORef (0 :: Int)
     let cleaned name = do
           modifyIORef inside (+ 1)
           forM_ [1 .. 100 :: Int] (const yield)
           n <- readIORef inside
-          unless (n == 1) (modifyIORef book ("not alone" :))
+          unless (n == 1) (modifyIORef logged ("not alone" :))
           modifyIORef inside (subtract 1)
-          modifyIORef book (name :)
+          modifyIORef logged (name :)
         hanging name = (atomically retry :: Behavior ()) `finally` cleaned name
     _ <- simulate (both (hanging "left") (hanging "right") `finally` cleaned "main")
-    reverse <$> readIORef book `shouldReturn` ["right", "left", "main"]
-  it "a cleanup's transactions and sleeps are done" $ do
+    reverse <$> readIORef logged `shouldReturn` ["right", "left", "main"]
+  it "a cleanup's transactions and sleeps have run" $ do
     motor <- newTVarIO True
     _ <- simulate ((atomically retry :: Behavior ()) `finally` (sleep 1 >> atomically (writeTVar motor False)))
     readTVarIO motor `shouldReturn` False
-  it "a cleanup that waits, or starts something, is unwound too" $ do
-    book <- newIORef []
+  it "a cleanup that blocks, or starts branches, is unwound, too" $ do
+    logged <- newIORef []
     _ <-
       simulate $
         (atomically retry :: Behavior ())
-          `finally` (both (atomically retry :: Behavior ()) (atomically retry :: Behavior ()) `finally` modifyIORef book ("inner" :))
-          `finally` modifyIORef book ("outer" :)
-    reverse <$> readIORef book `shouldReturn` ["inner", "outer"]
-  it "one that catches everything for ever does not run on" $ do
+          `finally` (both (atomically retry :: Behavior ()) (atomically retry :: Behavior ()) `finally` modifyIORef logged ("inner" :))
+          `finally` modifyIORef logged ("outer" :)
+    reverse <$> readIORef logged `shouldReturn` ["inner", "outer"]
+  it "a behaviour that catches every exception does not continue" $ do
     count <- newIORef (0 :: Int)
     let stubborn = forever $ do
           modifyIORef count (+ 1)
@@ -245,25 +245,25 @@ unwinding = do
     performMajorGC
     threadDelay 1000
     readIORef count `shouldReturn` counted
-  it "what the time's end cut off has run its cleanup" $ do
-    book <- newIORef []
-    _ <- simulateWith defaults {endAt = 1} (parallel (sleep 5 `finally` modifyIORef book ("left" :)) (sleep 9 `finally` modifyIORef book ("right" :)))
-    reverse <$> readIORef book `shouldReturn` ["right", "left"]
-  it "so it is when whoever simulates is cancelled" $ do
-    book <- newIORef []
+  it "at endAt, every cleanup has run" $ do
+    logged <- newIORef []
+    _ <- simulateWith defaults {endAt = 1} (parallel (sleep 5 `finally` modifyIORef logged ("left" :)) (sleep 9 `finally` modifyIORef logged ("right" :)))
+    reverse <$> readIORef logged `shouldReturn` ["right", "left"]
+  it "by a cancellation of the simulation's caller, every cleanup has run" $ do
+    logged <- newIORef []
     begun <- newEmptyMVar
-    let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef book ("cleaned up" :)
+    let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef logged ("cleaned up" :)
     withAsync (simulateWith defaults {livelockLimit = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
       takeMVar begun
       cancel caller
-    readIORef book `shouldReturn` ["cleaned up"]
-  it "a fork that outlives its scope cannot be" $ do
+    readIORef logged `shouldReturn` ["cleaned up"]
+  it "no fork has outlived its scope" $ do
     run <- simulate (scoped (\nursery -> void (fork nursery (sleep 100)) >> sleep 1))
     (finished run, leakedThreads run) `shouldBe` (1, [])
 
 beside :: Spec
 beside = do
-  it "two simulations at once do not disturb each other" $ do
+  it "two simulations at once are independent" $ do
     alone <- simulateWith defaults {scheduled = Seeded 7, detailed = True} mission
     (one, other) <-
       concurrently
@@ -285,7 +285,7 @@ beside = do
       run <- wait caller
       ended run `shouldBe` "failed Failed"
       (end - begin) `shouldSatisfy` (>= 0.002)
-  it "a note of theirs is not in the record" $ do
-    annotate "of nobody"
-    run <- simulate (annotate "of mine")
-    [text | Note text <- map did (steps run)] `shouldBe` ["of mine"]
+  it "a note of another run is not in the steps" $ do
+    annotate "outside"
+    run <- simulate (annotate "inside")
+    [text | Note text <- map did (steps run)] `shouldBe` ["inside"]

@@ -1,5 +1,5 @@
 -- |
--- Timers that are late.
+-- Late timers.
 module Sim.SlipSpec (spec) where
 
 import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVarIO)
@@ -17,28 +17,28 @@ import Support (guarded)
 
 spec :: Spec
 spec = guarded . describe "Slip" $ do
-  it "of 0 is none: the same schedules, and every sleeper on time" $
+  it "of 0 gives the same schedules, and every sleeper wakes on time" $
     forM_ [1 .. 200] $ \seed -> do
       exact <- simulateWith defaults {scheduled = Seeded seed, detailed = True} sleepers
       again <- simulateWith defaults {scheduled = Seeded seed, detailed = True, slip = 0} sleepers
       (steps again, schedule again) `shouldBe` (steps exact, schedule exact)
       late again `shouldBe` Just [0, 0, 0, 0]
-  it "lets a sleeper be overtaken by one that is due less than that later" $ do
+  it "lets a sleeper wake before another that is due less than the slip earlier" $ do
     orders <- ordersWith 0.5 [1, 1.3]
     sort orders `shouldBe` [[1, 1.3], [1.3, 1]]
-  it "and by none that is due later" $ do
+  it "does not let a sleeper wake before another that is due earlier by the slip or more" $ do
     ordersWith 0.5 [1, 1.5] `shouldReturn` [[1, 1.5]]
     ordersWith 0 [1, 1.3] `shouldReturn` [[1, 1.3]]
-  it "makes none late by more than that, and some late" $ do
+  it "makes some sleepers late, each by less than the slip" $ do
     lates <- mapM (\seed -> late <$> simulateWith defaults {scheduled = Seeded seed, slip = 0.5} sleepers) [1 .. 300]
     forM_ lates $ \l -> l `shouldSatisfy` maybe False (all (\s -> 0 <= s && s < 0.5))
     lates `shouldSatisfy` any (maybe False (any (> 0)))
-  it "is part of the schedule that a run tells of" $
+  it "is part of the schedule of a run" $
     forM_ [1 .. 100] $ \seed -> do
       one <- simulateWith defaults {scheduled = Seeded seed, slip = 0.5, detailed = True} sleepers
       other <- simulateWith defaults {scheduled = schedule one, slip = 0.5, detailed = True} sleepers
       (steps one, schedule one, finished one) `shouldBe` (steps other, schedule other, finished other)
-  it "is explored exhaustively, and is no pre-emption" $ do
+  it "is explored exhaustively, and does not count as a pre-emption" $ do
     orders <- newIORef []
     report <- explore ((exhaustively 0) {runOptions = defaults {slip = 0.5}}) $ \simulated -> do
       order <- newTVarIO []
@@ -47,11 +47,11 @@ spec = guarded . describe "Slip" $ do
     complete report `shouldBe` True
     nub . sort <$> readIORef orders
       `shouldReturn` sort [[1, 1.3, 1.4], [1, 1.4, 1.3], [1.3, 1, 1.4], [1.3, 1.4, 1], [1.4, 1, 1.3], [1.4, 1.3, 1]]
-  it "does not move the time beyond the end that is set" $
+  it "does not move the time beyond endAt" $
     forM_ [1 .. 50] $ \seed -> do
       run <- simulateWith defaults {scheduled = Seeded seed, slip = 5, endAt = 2} (both (sleep 1) (sleep 4))
       finished run `shouldBe` 2
-  it "finds what hangs on exact timers" $ do
+  it "finds a defect that depends on exact timers" $ do
     found <- tryExplore ((randomly 1000) {runOptions = defaults {slip = 0.1}}) $ \simulated -> do
       run <- simulated $ do
         parked <- newTVarIO False
@@ -61,7 +61,7 @@ spec = guarded . describe "Slip" $ do
       traverse_ fail [explain (outcome run) | Failing _ <- [outcome run]]
     either (const "found") show found `shouldBe` "found"
 
--- | Four that sleep, twice each: how late each is in all.
+-- | Four branches that sleep; returns how late each wakes.
 sleepers :: Behavior [Seconds]
 sleepers = allOf [lateness (sleepTo s) | s <- [1, 1.2, 1.4, 1.6]]
  where
@@ -77,7 +77,7 @@ late run = case outcome run of
 ordered :: TVar [Seconds] -> [Seconds] -> Behavior [()]
 ordered order moments = allOf [sleep s >> atomically (modifyTVar' order (s :)) | s <- moments]
 
--- | The orders in which those that sleep so long wake, in many schedules.
+-- | The orders in which sleepers with these durations wake, under many schedules.
 ordersWith :: Seconds -> [Seconds] -> IO [[Seconds]]
 ordersWith slip' moments = nub <$> mapM one [1 .. 200]
  where
