@@ -280,7 +280,7 @@ classify = \case
 defined :: SomeException -> IO SomeException
 defined e = try (evaluate (forced e)) >>= either defined pure
 
--- | The exception; all that handlers match on is evaluated with it.
+-- | The exception; evaluating it also evaluates everything that handlers match on.
 forced :: SomeException -> SomeException
 forced e@(SomeException inner)
   | Just (BehaviorFailed failure) <- fromException e = failure `seq` e
