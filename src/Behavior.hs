@@ -9,44 +9,45 @@
 --
 -- == Failure, fault, cancellation
 --
--- * A /failure/ is an exception under 'BehaviorFailed': the robot could not do it.
---   '?' and all that derives from it catch exactly this.
+-- * A /failure/ is an exception under 'BehaviorFailed': the robot could not do its task.
+--   '?' and the operators derived from it catch exactly these exceptions.
 -- * A /fault/ is any other synchronous exception: a bug, a lost connection. No
 --   operator swallows one.
--- * A /cancellation/ is an asynchronous exception: somebody no longer wants this
---   behaviour. No operator swallows one.
+-- * A /cancellation/ is an asynchronous exception: the behaviour is to stop early. No
+--   operator swallows one.
 --
 -- == What every operator promises
 --
--- 1. /Structured./ When it returns or throws, every behaviour that it started has
+-- 1. /Structured./ When an operator returns or throws, every behaviour that it started has
 --    ended, cleanup included, even if the caller was interrupted twice meanwhile.
 --    (So a slow cleanup makes the caller wait.)
--- 2. /Never both./ 'rSelect' and 'monitor' start a branch only after the one before,
+-- 2. /Never both./ 'rSelect' and 'monitor' start a branch only after the previous one,
 --    cleanup included, has ended.
--- 3. /No lost work./ An operator's own branch that was asked to stop and returned all the
---    same has completed: its result stands, and that operator does not run it again. (An
---    outer operator that interrupts this one between its branch's completion and its return
---    loses the result: see below.)
--- 4. /No lost fault./ A fault of a branch, also while it is being stopped, always
---    gets out.
--- 5. /Interruptible./ What runs in a thread of its own (every branch, and
---    the recovery of 'monitor') runs unmasked, whatever the caller's masking state. '?',
---    'attempt' and 'fallbackOver' keep the caller's.
--- 6. /Together./ What has to stop is asked all at once, then waited for.
+-- 3. /No lost work./ If an operator's own branch returns although its stop was requested, it
+--    has completed: its result stands, and that operator does not run it again. (If an outer
+--    operator interrupts this one after the branch has completed, and before this operator
+--    has returned, the result is lost: see below.)
+-- 4. /No lost fault./ A fault of a branch, also one thrown while the branch is being
+--    stopped, always reaches the caller (of several, the leftmost).
+-- 5. /Interruptible./ What runs in its own thread (every branch, and the recovery of
+--    'monitor') runs unmasked, whatever the caller's masking state. '?', 'attempt' and
+--    'fallbackOver' keep the caller's masking state.
+-- 6. /Together./ An operator first requests the stop of everything that has to stop, and
+--    then waits.
 -- 7. /Constant space./ A million reselections, recoveries, retries or alternatives
 --    (nested to the right) run in constant memory.
 -- 8. /Labelled./ Every thread is labelled with its operator and branch.
--- 9. /A dead sensor is never \"false\"./ A condition that fails or faults, or has no
---    value any more, fails its operator, after the branch has stopped.
--- 10. /Nothing spins./ An operator that waits uses no processor time; readings of one
---     polled condition by one operator, rereads included, have slots a period apart, and
---     each slot has at most one.
+-- 9. /A dead sensor is never \"false\"./ A condition that fails, faults or no longer has a
+--    value ends its operator with a failure or fault, after the branch has stopped.
+-- 10. /Nothing spins./ An operator that waits uses no processor time. Readings of one
+--     polled condition by one operator, rereads included, have slots that are one period
+--     apart; each slot has at most one reading.
 --
 -- == Which outcome, when several things happened
 --
--- An operator asks, in this order:
+-- The first of these questions that is answered with yes decides:
 --
--- 1. Was something thrown at the caller from outside, of whatever type? (As by
+-- 1. Was an exception, of whatever type, thrown at the caller from outside? (As by
 --    @throwTo main (ExitFailure 3)@ in a signal handler.) Every branch is stopped, and the
 --    same exception is thrown; if a branch faulted as well, 'StoppedWithFault' carries both.
 -- 2. Did a branch fault? (The leftmost.)
@@ -54,54 +55,59 @@
 -- 4. Did a sensor fail?
 -- 5. Did the condition change?
 --
--- '?', 'attempt', 'failingOn' and handlers of your own run in the caller's thread and go by
--- type: what is thrown there from outside, and is a failure by its type, is a failure to them.
--- When GHC finds that all wait for each other, a branch's fault comes first.
+-- '?', 'attempt', 'failingOn' and your own handlers run in the caller's thread and decide by
+-- the exception's type: an exception that is thrown there from outside counts as a failure
+-- if its type is that of a failure. When GHC detects that the operator and its branches wait
+-- for each other (a deadlock), a branch's fault comes first.
 --
 -- == Work that must survive nested interruptions
 --
--- Delivers twice, when the battery falls low while the phone is slow to stop: the delivery
--- completed, but the outer 'monitor' interrupted 'Behavior.Parallel.firstOf' before that returned.
+-- The following delivers twice if the battery falls low while the phone is slow to stop: the
+-- delivery has completed, but the outer 'monitor' interrupts 'Behavior.Parallel.firstOf'
+-- before that returns.
 --
 -- > monitor low charge (whileHolding ok (firstOf [deliver, phone]))
 --
--- The branch itself records that it completed, and looks at that when it is run again:
+-- To avoid that, the branch records that it has completed, and reads the record when it is
+-- run again:
 --
 -- > done <- newTVarIO False
 -- > let once = atomically (readTVar done) >>= \is -> unless is (deliver >> atomically (writeTVar done True))
 -- > monitor low charge (whileHolding ok (firstOf [once, phone]))
 --
--- What must not be cut in two, the last step of @deliver@ and the record of it, is put under one
--- 'Control.Exception.mask_'.
+-- No interruption may come between the last step of @deliver@ and the record of it: put both
+-- under one 'Control.Exception.mask_'.
 --
 -- == Cleanups that take time
 --
--- @finally@, @bracket@ and @onException@ run a cleanup masked. What waits in it ('sleep', a transaction
--- that retries) can be interrupted all the same: by a stop request, when the behaviour had ended by
--- itself and was cleaning up already. The rest of the cleanup is then skipped, and the recovery
--- starts. A cleanup that must be finished is made uninterruptible; whatever stops it waits:
+-- @finally@, @bracket@ and @onException@ run a cleanup masked. Still, a stop request can
+-- interrupt a blocking operation in it ('sleep', a transaction that retries), if the
+-- behaviour had ended by itself and was already cleaning up when its stop was requested. The
+-- rest of the cleanup is then skipped, and the recovery starts. Make a cleanup that must be
+-- finished uninterruptible; the operator that stops it waits for it:
 --
 -- > (extend arm >> takePicture) `finally` uninterruptibleMask_ (park arm)
 --
 -- == What GHC limits
 --
--- An operator waits for the cleanups of its branches, and what is thrown at its caller meanwhile is
--- first received, then pending, as in a thread that cannot be interrupted. So a cleanup may throw to
--- the operator's caller itself, once:
+-- An operator waits for the cleanups of its branches. Meanwhile it receives the first
+-- exception that is thrown at its caller; later ones stay pending, as in a thread that cannot
+-- be interrupted. So a cleanup may itself throw to the operator's caller, once:
 --
 -- > parallel drive (steer `finally` throwTo me EmergencyStop)
 --
--- A second exception, or one for a caller that is masked or has been stopped already (as the caller
--- of a nested operator has, whose outer one was stopped), hangs: @throwTo@ waits for the caller, and
--- that for the cleanup. (A simulation ends there, and names both.) Have a thread of its own throw it:
+-- A second exception hangs. So does one for a caller that is masked or has already been
+-- stopped, as the caller of a nested operator is when the outer operator has been stopped:
+-- @throwTo@ waits for the caller, and the caller waits for the cleanup. (A simulation ends
+-- there, and names both threads.) Let a separate thread throw it:
 --
 -- > parallel drive (steer `finally` forkIO (throwTo me EmergencyStop))
 --
--- A behaviour that never reaches a point where it could be interrupted is not: a loop that
--- never allocates (compile it with @-fno-omit-yields@), a safe foreign call (import it
--- @interruptible@). A behaviour cannot count on recovering from
--- 'Control.Exception.BlockedIndefinitelyOnMVar' and its like, since GHC throws that to the
--- operator that waits for it too.
+-- A behaviour that never reaches a point where it can be interrupted does not stop: a loop
+-- that never allocates (compile it with @-fno-omit-yields@), a safe foreign call (import it
+-- @interruptible@). A behaviour cannot rely on recovering from
+-- 'Control.Exception.BlockedIndefinitelyOnMVar' and similar exceptions, because GHC throws
+-- them to the operator that waits for the behaviour, too.
 module Behavior
   ( -- * Behaviours
     Behavior

@@ -5,8 +5,8 @@
 {-# LANGUAGE TypeOperators #-}
 
 -- |
--- The language with the surface syntax of the paper: with this module its complete
--- listings compile as they are printed.
+-- The language with the surface syntax of the paper: with this module the paper's
+-- complete listings compile as they are printed.
 --
 -- > {-# LANGUAGE RebindableSyntax #-}
 -- > {-# LANGUAGE ScopedTypeVariables #-}
@@ -26,21 +26,21 @@
 --
 -- Besides what is described below, the module gives
 --
--- * the Prelude, but for 'not' and '>', which are overloaded here;
--- * "Behavior", but for the names that are overloaded here: so '?', 'parallel', @|||@,
---   'both' and 'fallbackOver' are its very own;
+-- * the Prelude, except 'not' and '>', which are overloaded here;
+-- * "Behavior", except the names that are overloaded here: '?', 'parallel', @|||@,
+--   'both' and 'fallbackOver' are those of "Behavior";
 -- * 'throw' and 'catch'.
 --
--- Nothing is implemented anew: every overloaded name stands for one of "Behavior" or
--- of the Prelude, chosen by the type of its first argument alone. All other types
--- follow from that, which is why listings need no annotations.
+-- Nothing is implemented twice: every overloaded name stands for one of "Behavior" or
+-- of the Prelude, chosen only by the type of its first argument. All other types
+-- follow from that, so listings need no annotations.
 --
--- It is also why the type of the first argument of 'fallback', 'attempt' and '>' must
+-- Therefore the type of the first argument of 'fallback', 'attempt' and '>' must
 -- be known: @5 > 3@ does not compile here, nor does @fallback failed (return 1)@. In
--- code of your own, use "Behavior".
+-- your own code, use "Behavior".
 --
--- Not everything that the paper prints does what its text says: the table of errata,
--- @docs/errata.md@, lists what does not.
+-- Some of the paper's listings do not do what its text states: they are listed in the table
+-- of errata, @docs/errata.md@.
 module Behavior.Paper
   ( -- * Conditions
     Condition (..)
@@ -80,10 +80,10 @@ import qualified Behavior
 -- >>> let doorClosed = return True :: Behavior Bool
 -- >>> let batteryLevel = return 5 :: Behavior Int
 
--- | What @if@, 'unless', 'rSelect' and 'monitor' can test: a 'Bool', which is what it
--- is for ever, or a @'Behavior' Bool@, which is run to find out.
+-- | What @if@, 'unless', 'rSelect' and 'monitor' can test: a 'Bool', which never changes,
+-- or a @'Behavior' Bool@, which is run to find out.
 --
--- [Failure] A condition that fails is not \"false\": whatever tests it fails.
+-- [Failure] A condition that fails is not \"false\": the operator that tests it fails.
 -- [Fault] Likewise.
 --
 -- /Section 4.1 of the paper: a condition is a @Behavior Bool@./
@@ -110,8 +110,8 @@ class Condition c where
   -- @since 0.1.0.0
   not :: c -> c
 
-  -- | Whether both conditions are true. The second is tested only if the first is
-  -- true, and then after it; it binds like '&&'.
+  -- | Whether both conditions are true. The second is tested after the first, and only if
+  -- the first is true. It binds like '&&'.
   --
   -- > left & right  =  do { l <- left; if l then right else return False }
   --
@@ -142,8 +142,8 @@ instance (m ~ Behavior, a ~ Bool) => Condition (m a) where
 --
 -- @since 0.1.0.0
 class Condition c => Conditional c r where
-  -- | What @if@ means under @RebindableSyntax@. A @'Behavior' Bool@ is tested once,
-  -- before; unlike 'rSelect' it then interrupts nothing.
+  -- | The meaning of @if@ under @RebindableSyntax@. A @'Behavior' Bool@ is tested once, before
+  -- a branch starts; unlike 'rSelect', it interrupts nothing afterwards.
   --
   -- > if condition then yes else no  =  do { c <- condition; if c then yes else no }
   --
@@ -153,7 +153,7 @@ class Condition c => Conditional c r where
   -- >>> ifThenElse True 'y' 'n'
   -- 'y'
   --
-  -- [Failure] If the condition fails, so does the whole, and neither branch runs.
+  -- [Failure] If the condition fails, the whole @if@ fails, and neither branch runs.
   -- [Fault] Likewise.
   -- [Cancellation] Passes through.
   --
@@ -218,12 +218,12 @@ instance {-# OVERLAPPABLE #-} (Ord a, b ~ a, r ~ Bool) => Comparison a b r where
 instance (Ord a, b ~ a, r ~ Behavior Bool) => Comparison (IO a) b r where
   act > limit = (Prelude.> limit) <$> act
 
--- | What 'fallback' can be given: two behaviours, or a list of inputs and a behaviour
+-- | The arguments of 'fallback': two behaviours, or a list of inputs and a behaviour
 -- to try on each.
 --
 -- @since 0.1.0.0
 class Fallback s k r where
-  -- | Does one thing; if that /fails/, another.
+  -- | Runs the first behaviour; if that /fails/, runs the next.
   --
   -- > fallback first second  =  Behavior.fallback first second     =  first ? second
   -- > fallback inputs act    =  Behavior.fallbackOver inputs act
@@ -285,7 +285,7 @@ instance Attempt (IO a) where
 instance Attempt b => Attempt (x -> b) where
   attempt n act = attempt n . act
 
--- | 'attempt', by the name that it has in the paper's introduction.
+-- | 'attempt', by its name in the paper's introduction.
 --
 -- > attemptNTimes  =  attempt
 --

@@ -1,6 +1,6 @@
 -- |
--- Several behaviours at once: 'parallel' and 'both', and their kin for any number
--- of behaviours that give results.
+-- Several behaviours at once: 'parallel' and 'both', and similar operators for any number
+-- of behaviours, which give results.
 --
 -- +---------------------------------+------------------+-------------------------------+
 -- |                                 | waits for        | gives                         |
@@ -12,10 +12,10 @@
 -- | 'scoped' and 'fork'             | the scoped one   | its result                    |
 -- +---------------------------------+------------------+-------------------------------+
 --
--- What 'fork' starts is a 'Child': one can 'await' its result, look at it without waiting
--- ('tryAwait'), and ask it to stop ('requestStop').
+-- 'fork' starts a behaviour and gives a 'Child': you can 'await' its result, read it without
+-- blocking ('tryAwait'), and request its stop ('requestStop').
 --
--- Whatever happens, what these start has ended, cleanup included, when they return
+-- In all cases, what these operators start has ended, cleanup included, when they return
 -- or throw.
 module Behavior.Parallel
   ( -- * Two
@@ -27,12 +27,12 @@ module Behavior.Parallel
   , firstOf
   , allOf
 
-    -- * One more, while the rest goes on
+    -- * Starting more while a behaviour runs
   , scoped
   , fork
   , Nursery
 
-    -- * What was started
+    -- * The forked behaviour
   , Child
   , await
   , tryAwait

@@ -3,15 +3,16 @@
 -- |
 -- Transactional variables: all of the package stm, with this library's 'atomically'.
 --
--- Import this module in place of "Control.Concurrent.STM": it exports all of that but
+-- Import this module in place of "Control.Concurrent.STM": it exports everything of that except
 -- @registerDelay@, whose time cannot be simulated ('Behavior.Time.sleep' and
--- 'Behavior.Time.timeout' can). The @atomically@ of stm works, too, until the behaviour is
--- simulated ("Behavior.Sim"): the simulator does not see a thread that waits by it.
+-- 'Behavior.Time.timeout' can be). The @atomically@ of stm works, too, unless the behaviour is
+-- simulated ("Behavior.Sim"): the simulator cannot see a thread that blocks in it.
 --
 -- >>> door <- newTVarIO False
 -- >>> both (atomically (readTVar door >>= check)) (atomically (writeTVar door True))
 --
--- To make or read a variable outside of a transaction ('newTVarIO', 'readTVarIO') never waits.
+-- Creating or reading a variable outside of a transaction ('newTVarIO', 'readTVarIO') never
+-- blocks.
 module Behavior.STM
   ( atomically
 #ifndef __HADDOCK_VERSION__

@@ -1,5 +1,5 @@
 -- |
--- What can be watched, and the reactive operators on it. Import it qualified:
+-- Signals, which can be watched, and the reactive operators on them. Import it qualified:
 --
 -- > import Behavior
 -- > import Behavior.Signal (Signal)
@@ -8,24 +8,24 @@
 -- > guarded :: Signal Int -> Behavior a -> Behavior a
 -- > guarded battery = Signal.monitor ((< 10) <$> battery) recharge
 --
--- The paper's 'Behavior.monitor' and 'Behavior.rSelect' poll their condition; these
--- react to whatever kind of signal they are given, and cost nothing while a signal
--- that is 'watching' a transaction does not change.
+-- The paper's 'Behavior.monitor' and 'Behavior.rSelect' poll their condition. The operators of
+-- this module react to every kind of signal; while a signal that is 'watching' a transaction
+-- does not change, they cost nothing.
 module Behavior.Signal
-  ( -- * What can be watched
+  ( -- * Signals
     Signal
   , watching
   , polling
 
-    -- ** More exactly
+    -- ** Filtering, and detecting stale readings
   , staleAfter
   , debounce
   , hysteresis
 
-    -- ** By several at once
+    -- ** Sharing between operators
   , withShared
 
-    -- * What to do meanwhile
+    -- * Reactive operators
 
     -- ** Interrupting
   , rSelect
@@ -35,7 +35,7 @@ module Behavior.Signal
   , switch
   , teleoReactive
 
-    -- ** Waiting for a condition, and holding to one
+    -- ** Waiting for a condition, and requiring one
   , waitUntil
   , whileHolding
   ) where

@@ -1,5 +1,5 @@
 -- |
--- Time, and waiting for it.
+-- Time: the clock, sleeping, and time limits.
 --
 -- Durations are 'Seconds', written as literals.
 --

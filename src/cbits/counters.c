@@ -1,5 +1,5 @@
-/* Numbers that many threads change at once, and that almost every operation looks at: here
-   that is one instruction, where a reference of Haskell's is a jump or three. */
+/* Counters that many threads change at the same time, and that almost every operation reads:
+   in C a read is one instruction; with a Haskell reference it takes one to three jumps. */
 
 #include <HsFFI.h>
 

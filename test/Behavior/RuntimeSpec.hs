@@ -105,7 +105,7 @@ interrupting = do
     end <- atomically (threadEnd thread)
     endingOf end `shouldBe` Gave 'a'
 
-  it "by a messenger does not wait" $ do
+  it "by a helper thread does not wait" $ do
     inside <- newGate
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))

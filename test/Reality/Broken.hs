@@ -37,7 +37,7 @@ lately s uninterruptible =
     , send = \target e -> do
         waits <- Set.member target <$> readTVarIO uninterruptible
         if waits
-          then void (spawn s (Label "interrupt" "messenger") (\_ _ -> thatEnds (uninterruptibleMask_ (throws target e))) pure)
+          then void (spawn s (Label "interrupt" "helper") (\_ _ -> thatEnds (uninterruptibleMask_ (throws target e))) pure)
           else send s target e
     , transact = after . transact s
     , clock = after (clock s)

@@ -220,7 +220,7 @@ throwers = do
       throwToAll (const (Holding held)) [threadId target]
       sleep 1 :: IO ()
       atomically STM.retry :: IO ()
-    explain (outcome run) `shouldSatisfy` ("interrupt: messenger waits for target, to hear an exception" `isInfixOf`)
+    explain (outcome run) `shouldSatisfy` ("interrupt: helper waits for target, to hear an exception" `isInfixOf`)
     performMajorGC
     (() <$) <$> deRefWeak weak `shouldReturn` Nothing
   it "has thrown nothing if the run ends and the remaining threads are unwound" $ do

@@ -5,9 +5,9 @@
 -- |
 -- Failure, and what to do about it.
 --
--- A /failure/ is the robot's: it could not do it. A /fault/ is the program's or
--- the machine's: a bug, a lost connection. A /cancellation/ is somebody's who no
--- longer wants the behaviour. The three are kept apart by their types:
+-- A /failure/ is the robot's: it could not do its task. A /fault/ is the program's or
+-- the machine's: a bug, a lost connection. A /cancellation/ comes from the caller's side: the
+-- behaviour is to stop early. The three differ in their types:
 --
 -- +--------------+------------------------------------------+------------------------+
 -- |              | is                                       | caught by '?'          |
@@ -70,8 +70,8 @@ import Data.Typeable (cast)
 
 -- | An action of the agent: it takes time, returns an @a@, or throws.
 --
--- Behaviours are composed in sequence with 'Prelude.>>=', 'Prelude.>>' and @do@,
--- which remember how far they have come; and with the operators of this package.
+-- Behaviours are composed in sequence with 'Prelude.>>=', 'Prelude.>>' and @do@
+-- (which keep track of the current step), and with the operators of this package.
 --
 -- /Sections 4 and 5 of the paper./
 --
@@ -80,7 +80,7 @@ type Behavior = IO
 
 -- | The root of all failures, as 'SomeException' is of all exceptions.
 --
--- To make a failure type of your own, put it under this root; it can then be
+-- To define your own failure type, put it under this root; it can then be
 -- caught by '?' together with every other failure, or by its own type:
 --
 -- >>> import Control.Exception
@@ -165,8 +165,8 @@ failWith = throwM . FailedBecause
 -- hardware: @failingOn chosen act@ is @act@, but where @act@ throws an @e@ that is
 -- @chosen@, it fails with that @e@ inside a 'BehaviorFailed'.
 --
--- A failure stays the failure it is, and an asynchronous exception is never
--- turned into anything, whatever type is asked for. Like '?' it goes by type, in the
+-- A failure stays as it is, and an asynchronous exception is never turned into a
+-- failure, whatever the type @e@. Like '?' it decides by the exception's type, in the
 -- caller's thread.
 --
 -- >>> import System.IO.Error
@@ -177,8 +177,8 @@ failWith = throwM . FailedBecause
 -- @since 0.1.0.0
 failingOn :: Exception e => (e -> Bool) -> Behavior a -> Behavior a
 failingOn chosen act =
-  -- 'catch', not 'try': between a 'try' and the rethrowing a second cancellation
-  -- could take the place of what was caught.
+  -- 'catch', not 'try': between a 'try' and the rethrowing, a second cancellation
+  -- could replace what was caught.
   act `catch` \e -> case fromException e of
     Just fault | not (isFailure e || isCancellation e), chosen fault -> throwIO (asFailure e)
     _ -> throwIO e
@@ -189,8 +189,7 @@ failingOn chosen act =
 isFailure :: SomeException -> Bool
 isFailure e = isJust (fromException e :: Maybe BehaviorFailed)
 
--- | Whether an exception is a cancellation: asynchronous by its type, which is all
--- that can be known of it.
+-- | Whether an exception is a cancellation. Only its type shows that: it is asynchronous.
 isCancellation :: SomeException -> Bool
 isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 
@@ -213,7 +212,7 @@ catchSynchronous act handler = act `catch` \e -> if isCancellation e then throwI
 -- own masking state (never inside an exception handler, where it could not be
 -- interrupted). What @second@ throws is thrown.
 --
--- It goes by the type of the exception, in the caller's thread: a failure that another
+-- It decides by the type of the exception, in the caller's thread: a failure that another
 -- thread throws to the caller (by 'Control.Exception.throwTo') while @first@ runs counts as
 -- the failure of @first@.
 --
@@ -257,8 +256,8 @@ fallbackWith first second = try first >>= either second pure
 -- >>> failed ? failed ? pure "the third"
 -- "the third"
 --
--- Under @ImplicitParams@ write spaces around it. It goes by the type of the exception, in
--- the caller's thread; for this and all else see 'fallback'.
+-- Under @ImplicitParams@ write spaces around it. For everything else see 'fallback'; in
+-- particular, it decides by the type of the exception, in the caller's thread.
 --
 -- @since 0.1.0.0
 (?) :: Behavior a -> Behavior a -> Behavior a
@@ -297,7 +296,7 @@ fallbackOver inputs act = case toList inputs of
 --
 -- The last failure is thrown as it is. With @n <= 0@ it fails at once with
 -- 'Failed', and nothing runs. Faults and cancellations pass through at once. Like '?' it
--- goes by type, in the caller's thread.
+-- decides by the exception's type, in the caller's thread.
 --
 -- >>> attempt 3 (putStrLn "push" >> failed)
 -- push
@@ -321,12 +320,12 @@ attempt n act
 -- > tryAny (pure a)     =  pure (Right a)
 -- > tryAny (throwIO e)  =  pure (Left (toException e))  -- unless e is asynchronous
 --
--- A cancellation passes through. What is one goes by type, in the caller's thread: every
--- exception under 'SomeAsyncException', and no other. So an exception of a synchronous type
--- that another thread throws to the caller counts as the behaviour's own.
+-- A cancellation passes through. An exception is one if its type is: every exception under
+-- 'SomeAsyncException', and no other, whichever thread threw it. So an exception of a synchronous
+-- type that another thread throws to the caller counts as the behaviour's own.
 --
 -- Use it where a fault must not end the program (around each of many missions, say). For
--- what the robot could not do there is '?'.
+-- failures use '?'.
 --
 -- >>> tryAny (failWith "locked" :: Behavior ())
 -- Left (FailedBecause "locked")
@@ -350,13 +349,13 @@ tryAny = trySynchronous
 catchAny :: Behavior a -> (SomeException -> Behavior a) -> Behavior a
 catchAny act handler = tryAny act >>= either handler pure
 
--- | What is thrown when a behaviour was cancelled and a cleanup faulted on the way
--- out: the cancellation and the fault, as one asynchronous exception, so that no
--- handler for ordinary exceptions takes it for the end of the matter.
+-- | What is thrown when a behaviour was cancelled and a cleanup faulted while it stopped:
+-- the cancellation and the fault, as one asynchronous exception, so that no
+-- handler for ordinary exceptions catches it.
 --
--- An operator that asked for the stop takes the fault out and throws it, as the
--- fault that it is. You meet the pair itself where a cancellation came from
--- outside this library, from 'System.Timeout.timeout' say.
+-- An operator that requested the stop takes the fault out and throws that. You meet the pair
+-- itself where a cancellation came from outside this library, from
+-- 'System.Timeout.timeout' say.
 --
 -- @since 0.1.0.0
 data StoppedWithFault = StoppedWithFault

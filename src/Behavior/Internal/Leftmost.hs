@@ -2,8 +2,8 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- One variable in which several branches publish, and the leftmost of them counts. So to wait
--- for the first of n branches is to read one variable, and not n.
+-- One variable in which several branches publish; what the leftmost of them published counts.
+-- So waiting for the first of n branches reads one variable instead of n.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Leftmost

@@ -39,28 +39,27 @@ import Behavior.Internal.Scope hiding (requestStop)
 -- @since 0.1.0.0
 newtype Nursery = Nursery (TVar Stage)
 
--- | How far a nursery has come.
+-- | The stage of a nursery.
 data Stage
-  = -- | What is requested of it, the newest first.
+  = -- | The requests to the scope's thread, the newest first.
     Open [Request]
-  | -- | All is being stopped. A child may be just forking; a cleanup may fork, too.
+  | -- | Everything is being stopped. A child may be forking just then; a cleanup may fork, too.
     Ending
-  | -- | All has ended.
+  | -- | Everything has ended.
     Closed
 
--- | What only the thread of the scope does: to start a branch, and to stop one.
+-- | What only the scope's thread does: it starts a branch, or stops one.
 data Request
-  = -- | ... and where to put what was started.
+  = -- | Starts the behaviour, and puts the branch into the variable.
     forall a. Fork (Behavior a) (TMVar (Branch a))
   | Stop SomeBranch
 
--- | A behaviour that was forked, and what can be known of it: its result, or how else it
--- ended.
+-- | The handle of a forked behaviour: it gives the behaviour's result, or how else it ended.
 --
 -- @since 0.1.0.0
 data Child a = Child (TVar Stage) (Branch a)
 
--- | The failure of whoever awaits the result of a child that was stopped.
+-- | The failure that 'await' throws for a child that was stopped.
 --
 -- @since 0.1.0.0
 data ChildStopped = ChildStopped
@@ -73,14 +72,14 @@ instance Exception ChildStopped where
 
 -- | Runs a behaviour that may 'fork' others, which are stopped when it ends.
 --
--- [Result] That of the behaviour. What was forked is then asked to stop, all at
---   once, and has ended when 'scoped' returns.
+-- [Result] That of the behaviour. Then the stop of the forked behaviours is requested, of all
+--   together; they have ended when 'scoped' returns.
 -- [Failure] If a forked behaviour fails, the scoped one and all the others are
 --   stopped, and that failure is thrown. (One that is stopped by 'requestStop' has not
 --   failed.)
 -- [Fault] The leftmost fault (the scoped behaviour's before those of the forked,
 --   in the order in which they were forked), in a cleanup too, is always thrown.
--- [Cancellation] All are asked to stop at once; it returns after all have ended.
+-- [Cancellation] Requests the stop of all together; returns after all have ended.
 --
 -- >>> :{
 -- scoped $ \nursery -> do
@@ -98,13 +97,13 @@ scoped body = do
   structured (\scope -> serveRequests stage scope (body (Nursery stage)) `finally` atomically (writeTVar stage Ending))
     `finally` atomically (writeTVar stage Closed)
 
--- | Starts and stops children as it is requested, until there is a verdict.
+-- | Serves the requests to start and stop children, until there is a verdict.
 serveRequests :: TVar Stage -> Scope -> Behavior a -> IO (IO a)
 serveRequests stage scope body = do
   failure <- newLeftmost
   main <- branch scope (Label "scoped" "body") body
-  let -- How many were forked; those that may live yet; and the number at which to look for
-      -- those that do not.
+  let -- How many were forked; the children that may still run; and the number of forks at which
+      -- to remove those that have ended.
       serve count children sweepAt = do
         next <- atomically (asum [Left . outcomeToIO <$> outcome main, Left . throwIO <$> readLeftmost failure, Right <$> requested])
         case next of
@@ -120,7 +119,7 @@ serveRequests stage scope body = do
         Stop child -> (count, children) <$ requestStopAsync [child]
         Fork act accepted -> do
           let n = count + 1 :: Int
-          -- Masked: what was started is also handed over.
+          -- Masked: a branch that was started is also handed over.
           child <- mask_ $ do
             new <- branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act
             new <$ atomically (putTMVar accepted new)
@@ -129,7 +128,7 @@ serveRequests stage scope body = do
         readTVar stage >>= \case
           Open new@(_ : _) -> reverse new <$ writeTVar stage (Open [])
           _ -> retry
-      -- Of those that have ended without trouble nothing is kept.
+      -- Nothing is kept of a child that has ended without an exception.
       mayRun (SomeBranch child) =
         tryReadOutcome child >>= \end -> case thrownBy <$> end of
           Just Nothing -> False <$ forget scope child
@@ -148,10 +147,10 @@ thrownBy = \case
 -- 'scoped' ends. It has been started when 'fork' returns.
 --
 -- [Result] A handle: see 'await', 'tryAwait' and 'requestStop'.
--- [Failure] While all is being stopped (in a cleanup, say, or in a child that forks as the
+-- [Failure] While everything is being stopped (in a cleanup, say, or in a child that forks as the
 --   scoped behaviour returns) nothing is started any more: it fails.
--- [Fault] Outside its 'scoped' the nursery is closed: an 'ErrorCall' says so.
--- [Cancellation] It may have been started then; it is stopped with the rest.
+-- [Fault] Outside its 'scoped' the nursery is closed: it throws an 'ErrorCall'.
+-- [Cancellation] The behaviour may already have been started; it is stopped with the rest.
 --
 -- @since 0.1.0.0
 fork :: Nursery -> Behavior a -> Behavior (Child a)
@@ -179,7 +178,7 @@ fork (Nursery stage) act = do
 --   'scoped' ended.
 -- [Fault] The child's, also of its cleanup.
 --
--- It never waits for ever for a child that has ended, however that was: a cleanup may
+-- For a child that has ended, however it ended, it does not block: so a cleanup may
 -- await one. (What a child throws also ends its 'scoped', whether it is awaited or not.)
 --
 -- @since 0.1.0.0
@@ -187,9 +186,9 @@ await :: Child a -> STM a
 await = tryAwait >=> maybe retry (either throwSTM pure)
 
 -- | How a child has ended, if it has: the result, or what 'await' would throw. It does not
--- wait.
+-- block.
 --
--- To wait for the end, however that is, write @tryAwait child >>= maybe retry pure@.
+-- To wait for the end, of whatever kind, write @tryAwait child >>= maybe retry pure@.
 --
 -- @since 0.1.0.0
 tryAwait :: Child a -> STM (Maybe (Either SomeException a))
@@ -199,11 +198,11 @@ tryAwait (Child _ child) = fmap ending <$> tryReadOutcomeSTM child
     Stopped _ -> Left (toException ChildStopped)
     end -> result end
 
--- | Asks a child to stop, and does not wait until it has. If it has ended, or was asked
--- before, this changes nothing.
+-- | Requests the stop of a child, and does not wait until it has stopped. If the child has ended,
+-- or its stop has already been requested, this has no effect.
 --
--- A child that is stopped is no failure of its 'scoped'. What its cleanup throws counts like
--- everything that a child throws; and if it completes all the same, its result stands.
+-- A stopped child does not make its 'scoped' fail. What its cleanup throws counts like
+-- everything that a child throws; and if it completes nevertheless, its result stands.
 --
 -- >>> :{
 -- scoped $ \nursery -> do

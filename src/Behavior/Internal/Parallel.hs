@@ -34,12 +34,12 @@ import Behavior.Internal.Scope
 --
 -- > parallel left right  =  firstOf [void left, void right]
 --
--- [Result] None. When both have finished as the operator looks (a /tie/), what
---   counts is how the left one ended.
--- [Failure] If the first to finish failed, its failure is thrown. That of a
---   behaviour which had already lost is ignored.
+-- [Result] None. When both have finished by the time the operator reads them (a /tie/), the
+--   left one's end counts.
+-- [Failure] If the first to finish failed, its failure is thrown. The failure of a behaviour
+--   that has already lost is ignored.
 -- [Fault] The leftmost fault of the two, in a cleanup too, is always thrown.
--- [Cancellation] Both are asked to stop at once. However it ends, it returns after
+-- [Cancellation] Requests the stop of both together. However it ends, it returns after
 --   both have ended, cleanup included: a slow cleanup makes the caller wait.
 --
 -- >>> parallel (pure ()) (sleep 3600)
@@ -54,8 +54,8 @@ parallel :: Behavior a -> Behavior b -> Behavior ()
 parallel left right = structured $ \scope -> do
   l <- branch scope (Label "parallel" "left") (void left)
   r <- branch scope (Label "parallel" "right") (void right)
-  -- At a glance only the left one: of the other it could not be said that the left one had
-  -- not ended before.
+  -- Outside a transaction only the left one is read: if the right one were read so, the left
+  -- one might have ended before it.
   outcomeToIO <$> tryReadThenBlock (tryReadOutcome l) (atomically (tryReadOutcomeSTM l >>= maybe (outcome r) pure))
 
 -- | 'parallel' as an operator. It binds looser than @?@ and tighter than
@@ -70,7 +70,7 @@ parallel left right = structured $ \scope -> do
 
 infixr 2 |||
 
--- | Starts two behaviours at once and waits for both.
+-- | Starts two behaviours at once, and waits for both.
 --
 -- > both left right  =  void (allOf [void left, void right])
 --
@@ -78,7 +78,7 @@ infixr 2 |||
 -- [Failure] The first failure stops the other behaviour, and is thrown; on a tie
 --   the left one.
 -- [Fault] The leftmost fault of the two, in a cleanup too, is always thrown.
--- [Cancellation] Both are asked to stop at once; it returns after both have ended.
+-- [Cancellation] Requests the stop of both together; returns after both have ended.
 --
 -- >>> both (sleep 0.01 >> putStrLn "arm is up") (putStrLn "light is on")
 -- light is on
@@ -91,7 +91,7 @@ both :: Behavior a -> Behavior b -> Behavior ()
 both left right = structured $ \scope -> do
   l <- branch scope (Label "both" "left") (void left)
   r <- branch scope (Label "both" "right") (void right)
-  let -- The left one first: when that has ended, it has also when the other is looked at.
+  let -- The left one is read first: what has ended then has also ended when the right one is read.
       tryReadBoth = tryReadOutcome l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$!> tryReadOutcome r)
       readBoth = verdict <$> tryReadOutcomeSTM l <*> tryReadOutcomeSTM r
   tryReadThenBlock tryReadBoth (atomically (readBoth >>= maybe retry pure))
@@ -102,16 +102,16 @@ both left right = structured $ \scope -> do
     (Just (Right ()), Just (Right ())) -> Just (pure ())
     _ -> Nothing
 
--- | Starts all at once and gives the result of the first to finish.
+-- | Starts all behaviours at once, and gives the result of the first to finish.
 --
 -- > firstOf []  =  failed
 --
--- [Result] That of the first to finish; on a tie, of the leftmost. The others are
---   asked to stop all at once, and have ended when it returns.
--- [Failure] If the first to finish failed, its failure is thrown. To be satisfied
---   with the first that /succeeds/, give the behaviours a @?@ of their own.
+-- [Result] That of the first to finish; on a tie, of the leftmost. The stop of the others is
+--   requested together, and they have ended when it returns.
+-- [Failure] If the first to finish failed, its failure is thrown. For the first that
+--   /succeeds/, give each behaviour its own @?@.
 -- [Fault] The leftmost fault of all, in a cleanup too, is always thrown.
--- [Cancellation] All are asked to stop at once; it returns after all have ended.
+-- [Cancellation] Requests the stop of all together; returns after all have ended.
 --
 -- >>> firstOf [sleep 3600 >> pure "camera", pure "lidar"]
 -- "lidar"
@@ -124,13 +124,13 @@ firstOf behaviors = structured $ \scope -> do
   void $ startAll (\n -> branchWithHook (publish first n) scope (Label "firstOf" (show n))) behaviors
   outcomeToIO <$> tryReadThenBlock (tryReadLeftmost first) (atomically (readLeftmost first))
 
--- | Starts all at once, waits for all, and gives their results, each in the place
+-- | Starts all behaviours at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
 --
--- [Result] All results. On nothing it returns nothing.
+-- [Result] All results. On an empty container it returns that.
 -- [Failure] The first failure stops the rest, and is thrown; on a tie the leftmost.
 -- [Fault] The leftmost fault of all, in a cleanup too, is always thrown.
--- [Cancellation] All are asked to stop at once; it returns after all have ended.
+-- [Cancellation] Requests the stop of all together; returns after all have ended.
 --
 -- >>> allOf [pure "left wheel", pure "right wheel"]
 -- ["left wheel","right wheel"]
@@ -150,17 +150,17 @@ allOf behaviors = structured $ \scope -> do
         maybe (awaitAll bs) (pure . throwIO) failing
   awaitAll branches
 
--- | The container, with these (as many) for its elements.
+-- | The container with its elements replaced by those of the list, which has as many.
 refilled :: Traversable t => t x -> [a] -> t a
 refilled container = snd . flip (mapAccumL next) container
  where
   next (a : as) _ = (as, a)
   next [] _ = error "refilled: there are fewer elements than places"
 
--- | Starts behaviours from left to right, each with its number for a name.
+-- | Starts behaviours from left to right; the function is given each one's number.
 --
--- In constant stack: after each start GHC may turn to another thread, and before that it
--- walks through all of this one's stack.
+-- In constant stack: after each start GHC may run another thread, and before that it traverses
+-- the whole stack of this one.
 startAll :: (Int -> Behavior a -> IO (Branch a)) -> [Behavior a] -> IO [Branch a]
 startAll startOne = fmap reverse . foldM next [] . zip [1 ..]
  where

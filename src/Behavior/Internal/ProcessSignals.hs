@@ -3,20 +3,20 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- SIGINT and SIGTERM, which belong to the whole process.
+-- Handling SIGINT and SIGTERM, which belong to the whole process.
 --
 -- GHC calls a handler in a new thread, some time after the signal: by then the run that
--- installed it may have ended, and another may have begun. So the handler here is one and
--- the same for all runs, and looks who is running when it is called. No signal is lost:
+-- installed it may have ended, and another may have begun. So there is a single handler for
+-- all runs, which looks up the current runs when it is called. No signal is lost:
 --
--- (A) While something runs, all that runs receives the signal.
+-- (A) While there are runs, all of them receive the signal.
 --
--- (B) When nothing runs any more, the signal is raised again for the handler that was there
---     before the run.
+-- (B) When there is no run any more, the signal is raised again for the handler that was
+--     installed before the first run.
 --
--- (C) A signal whose handler GHC has yet to call is dropped when that handler is replaced by
---     the default. So where the default was before, this handler stays, and (B) is what it
---     does.
+-- (C) A signal whose handler GHC has not yet called is dropped if that handler is replaced by
+--     the default. So where the default was installed before, this handler stays installed,
+--     and does (B).
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.ProcessSignals
@@ -26,7 +26,7 @@ module Behavior.Internal.ProcessSignals
 #if defined(mingw32_HOST_OS)
 import Control.Concurrent.STM (STM, retry)
 
--- | Runs the action with a transaction that waits for a signal. (There is none here.)
+-- | Runs the action with a transaction that waits for a signal. (On Windows it waits for ever.)
 withSignals :: (STM Int -> IO a) -> IO a
 withSignals act = act retry
 #else
@@ -48,7 +48,7 @@ import System.Posix.Types (ProcessID)
 import Behavior.Internal.Runtime (atomically)
 
 -- | Runs the action with a transaction that waits for a signal, and gives the exit code
--- that stands for it. A signal that came while the action ran, but was not taken by that
+-- for it. A signal that was received while the action ran, but was not taken by that
 -- transaction, is raised again when the action has ended.
 withSignals :: (STM Int -> IO a) -> IO a
 withSignals act = bracket enter leave $ \(_, state) ->
@@ -57,27 +57,26 @@ withSignals act = bracket enter leave $ \(_, state) ->
       Received signal -> exitCode signal <$ writeTVar state Taken
       _ -> retry
 
--- | Whether a run has been sent a signal.
+-- | Whether a run has received a signal.
 data State
-  = Undisturbed
+  = NoSignal
   | Received Signal
   | Taken
   deriving (Eq)
 
--- | What the handler has to know.
+-- | The state that the handler uses.
 data Process = Process
   { runs :: [(Int, Weak (TVar State))]
-  -- ^ What has not ended, each with its number, the newest first. The references are weak:
-  -- the handler must not keep a waiting thread reachable, or GHC would not notice when
-  -- everything is deadlocked.
+  -- ^ The runs that have not ended, each with its number, the newest first. The references are
+  -- weak: if the handler kept a waiting thread reachable, GHC could not detect a deadlock.
   , before :: [(Signal, Handler)]
-  -- ^ The handlers that were there before the first of these runs.
+  -- ^ The handlers that were installed before the first of these runs.
   , pending :: Maybe Signal
-  -- ^ What the runs have received, unless one has taken it.
+  -- ^ The signal that the runs have received, unless one of them has taken it.
   , defaulted :: Bool
   -- ^ Whether the first signal has come: the next ends the process at once.
   , owner :: Maybe ProcessID
-  -- ^ Whose runs these are.
+  -- ^ The process that these runs belong to.
   }
 
 process :: MVar Process
@@ -87,17 +86,18 @@ process = unsafePerformIO (newMVar nothingRuns)
 nothingRuns :: Process
 nothingRuns = Process {runs = [], before = [], pending = Nothing, defaulted = False, owner = Nothing}
 
--- | What runs here. (In a process that was made by @forkProcess@ nothing of the first one's does.)
+-- | The state for the current process. (A process made by @forkProcess@ has none of the runs of
+-- the original process.)
 here :: Process -> IO Process
 here known = do
   self <- getProcessID
   pure (if owner known == Just self then known else nothingRuns {owner = Just self})
 
--- | A run begins. (One that begins while others are being stopped belongs to a cleanup; the
+-- | Begins a run. (A run that begins while others are being stopped belongs to a cleanup; the
 -- second signal ends it with them.)
 enter :: IO (Int, TVar State)
 enter = do
-  state <- newTVarIO Undisturbed
+  state <- newTVarIO NoSignal
   weakly <- mkWeakTVar state (pure ())
   modifyMVar process $ here >=> \known -> do
     installed <- if null (runs known) then install known else pure known
@@ -112,7 +112,7 @@ enter = do
       pure (signal, if stayed then Default else handlerBefore)
     pure known {before = old}
 
--- | A run has ended.
+-- | Ends a run.
 leave :: (Int, TVar State) -> IO ()
 leave (n, state) = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
   end <- readTVarIO state
@@ -125,7 +125,7 @@ leave (n, state) = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
       (signal, handler) -> void (installHandler signal handler Nothing)
     for_ (pending left) raiseSignal
 
--- | What is done at a signal.
+-- | The handler of a signal.
 received :: Signal -> IO ()
 received signal = uninterruptibleMask_ . modifyMVar_ process $ here >=> \known -> do
   there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
@@ -133,25 +133,25 @@ received signal = uninterruptibleMask_ . modifyMVar_ process $ here >=> \known -
     -- (B)
     [] -> known <$ passOn signal
     _
-      -- It came with the first one, before the default was there.
+      -- It came together with the first one, before the default was installed.
       | defaulted known -> pure known
       | otherwise -> do
           atomically (for_ there (`writeTVar` Received signal))
           for_ handlers $ \(each, _) -> installHandler each Default Nothing
           pure known {pending = Just signal, defaulted = True}
 
--- | Raises the signal for the handler that is there; where it is ours, the default was
--- there before.
+-- | Raises the signal for the handler that is installed; if that is ours, the default was
+-- installed before.
 passOn :: Signal -> IO ()
 passOn signal = do
-  -- To look at a handler is to replace it. With ours in its place nothing is lost meanwhile.
+  -- Reading a handler replaces it. With ours in its place no signal is lost meanwhile.
   for_ (lookup signal handlers) $ \ours -> do
     there <- installHandler signal ours Nothing
     stayed <- isOurs signal there
     installHandler signal (if stayed then Default else there) Nothing
   raiseSignal signal
 
--- | Whether it is the handler that this module installs.
+-- | Whether the handler is the one that this module installs.
 isOurs :: Signal -> Handler -> IO Bool
 isOurs signal there = case (lookup signal handlers, there) of
   (Just (Catch ours), Catch act) -> do
@@ -160,7 +160,7 @@ isOurs signal there = case (lookup signal handlers, there) of
     pure (eqStableName ourName name)
   _ -> pure False
 
--- | The handlers, which exist once.
+-- | The handlers of this module. (Evaluated once, so that they can be compared.)
 handlers :: [(Signal, Handler)]
 handlers = [(sigINT, Catch onInterrupt), (sigTERM, Catch onTermination)]
 {-# NOINLINE handlers #-}
@@ -171,7 +171,7 @@ onTermination = received sigTERM
 {-# NOINLINE onInterrupt #-}
 {-# NOINLINE onTermination #-}
 
--- | What a shell shows of a process that the signal has ended.
+-- | The exit code that a shell shows for a process that was ended by the signal.
 exitCode :: Signal -> Int
 exitCode signal = 128 + fromIntegral signal
 #endif

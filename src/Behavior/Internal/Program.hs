@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The life of a program.
+-- Running a behaviour as a program.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Program
@@ -17,8 +17,7 @@ import Behavior.Internal.ProcessSignals (withSignals)
 import Behavior.Internal.Runtime (Label (..), atomically)
 import Behavior.Internal.Scope
 
--- | What the @main@ of a program calls: runs the behaviour as a program should be
--- run.
+-- | Runs a behaviour as a whole program; to be called by @main@.
 --
 -- * It runs in an unbound thread. In the thread of @main@, which is bound, each
 --   thread switch would be a system call.
@@ -28,21 +27,21 @@ import Behavior.Internal.Scope
 --
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
 -- instead of the exit. A signal that comes too late to cancel the behaviour is raised
--- again, for the handler that was there before: no signal is without effect. (After the
--- behaviour SIGINT and SIGTERM do what they did before it. Where that was the default, a
--- handler does it, so 'System.Posix.Signals.installHandler' shows one.)
+-- again, for the handler that was installed before: no signal is without effect. (After the
+-- behaviour, SIGINT and SIGTERM have the effect that they had before it. If that was the
+-- default, a handler of this library does it, so 'System.Posix.Signals.installHandler'
+-- returns that handler.)
 --
 -- Call it in the thread of @main@. In a thread of 'Control.Concurrent.forkIO' the exit code
 -- is thrown in that thread: the behaviour is cancelled, and the process goes on. When
 -- @main@ returns, the process ends and no cleanup of other threads runs. Signals belong to
--- the whole process: where several behaviours run so, one inside the other or side by side,
+-- the whole process: where several behaviours are run so, one inside the other or side by side,
 -- a signal cancels all of them. In a process made by @forkProcess@ none of them runs, and
--- nothing wakes that sleeps there: fork before.
+-- no sleep there ever ends: call @forkProcess@ before.
 --
--- An action that needs a bound thread can have one by
--- 'Control.Concurrent.runInBoundThread', but then nothing interrupts it: a stop request
--- waits until the action has returned. With @withAsyncBound act wait@ (of the package
--- async) it can be interrupted.
+-- An action that needs a bound thread can run in 'Control.Concurrent.runInBoundThread', but
+-- then it cannot be interrupted: a stop request waits until the action has returned. With
+-- @withAsyncBound act wait@ (of the package async) it can be interrupted.
 --
 -- >>> runBehavior (pure "done")
 -- "done"

@@ -4,13 +4,13 @@
 {-# LANGUAGE RankNTypes #-}
 
 -- |
--- The seam: all that the library does with threads, time and waiting goes through
--- this module. No other module (but the clock that it sleeps by,
--- "Behavior.Internal.Runtime.TimerWheel") forks, delays, throws to a thread or waits in a
--- transaction, so a simulation that takes over here has taken over everything.
+-- The seam: everything that the library does with threads, time and blocking goes through
+-- this module. No other module (except the timers that it sleeps by,
+-- "Behavior.Internal.Runtime.TimerWheel") forks, delays, throws to a thread or blocks in a
+-- transaction. So a simulation that replaces the operations of this module replaces all of them.
 --
--- Each operation is done in reality, or in the simulation that the calling thread
--- is part of ("Behavior.Internal.Runtime.Dispatch").
+-- Each operation is dispatched to one of two backends: the real one, or the simulation that
+-- the calling thread is part of ("Behavior.Internal.Runtime.Dispatch").
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime
@@ -79,7 +79,7 @@ import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Counter
 import Behavior.Internal.Runtime.Dispatch
-import qualified Behavior.Internal.Runtime.TimerWheel as Alarm
+import qualified Behavior.Internal.Runtime.TimerWheel as Timer
 import Behavior.Internal.Seconds
 
 -- | A thread that the library has started, and what it publishes as it ends.
@@ -92,6 +92,7 @@ data Thread r = Thread
   -- ^ Nothing until it has ended, cleanup included.
   }
 
+-- | The thread itself.
 threadId :: Thread r -> ThreadId
 threadId = asyncThreadId . threadAsync
 
@@ -103,7 +104,7 @@ threadEnd thread = tryReadEndSTM thread >>= maybe STM.retry pure
 tryReadEndSTM :: Thread r -> STM (Maybe r)
 tryReadEndSTM = STM.readTVar . threadResult
 
--- | The same, at a glance.
+-- | The same outside a transaction. Does not block.
 tryReadEnd :: Thread r -> IO (Maybe r)
 tryReadEnd = STM.readTVarIO . threadResult
 
@@ -114,10 +115,11 @@ start :: Label -> IO a -> IO (Thread (Either SomeException a))
 start = startWith pure (\_ -> pure ())
 {-# INLINE start #-}
 
--- | The same, but the thread publishes what the first function, which runs in it and masked,
--- makes of how the action ended. The second function is done in the same transaction.
+-- | Like 'start', but the thread publishes the result of the first function, which it applies,
+-- masked, to how the action ended. The second function is part of the transaction that
+-- publishes.
 --
--- (What is inlined here, and what is not, is so that the switch costs nothing.)
+-- (The inlining here is chosen so that the dispatch costs nothing.)
 startWith :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
 startWith finish hook label act = inSimulation (startReally finish hook label act) (startSimulated finish hook label act)
 {-# INLINE startWith #-}
@@ -143,11 +145,11 @@ startSimulated finish hook label act simulation = do
   add threads 1
   pure (Thread thread result)
  where
-  -- Between its last operation and its end it can still be stopped, as in reality.
+  -- It can still be stopped between its last operation and its end, as in reality.
   toItsEnd = act >>= \a -> a <$ pause simulation
 {-# NOINLINE startSimulated #-}
 
--- | What a thread does (it reports as it is told), and how the action ended.
+-- | Runs the action, and gives how it ended. Events are passed to the given function.
 runThread :: (Event -> IO ()) -> Label -> IO a -> IO (Either SomeException a)
 runThread report label act = do
   when labelling (labelSelf label)
@@ -158,13 +160,13 @@ runThread report label act = do
   pure end
 {-# INLINE runThread #-}
 
--- | The calling thread has this label from now on.
+-- | Labels the calling thread.
 labelSelf :: Label -> IO ()
 labelSelf label = myThreadId >>= \self -> labelThread self (show label)
 {-# NOINLINE labelSelf #-}
 
--- | Whether labels can be seen by anybody. Before GHC 9.6 only an event log shows them,
--- and to label a thread costs more than to start it.
+-- | Whether labels are visible anywhere. Before GHC 9.6 only an event log shows them,
+-- and labelling a thread costs more than starting it.
 labelling :: Bool
 #if MIN_VERSION_base(4,18,0)
 labelling = True
@@ -177,25 +179,26 @@ labelling = unsafePerformIO (traced <$> getTraceFlags)
 {-# NOINLINE labelling #-}
 #endif
 
--- | Throws an exception to a thread, and returns when that has heard it or has ended. A
--- thread in an uninterruptible cleanup is slow to hear; whoever waits for it can be
--- interrupted, and then has thrown nothing.
+-- | Throws an exception to a thread, and returns when the thread has received it or has ended.
+-- A thread in an uninterruptible cleanup receives it after that cleanup. While the caller waits
+-- it can be interrupted; then nothing has been thrown.
 interrupt :: Exception e => ThreadId -> e -> IO ()
 interrupt thread e =
   inSimulation (throwTo thread e) (\simulation -> deliver simulation thread (toException e))
 
 -- | 'interrupt' for a caller that then waits for the end of the thread. It is not withdrawn: if
--- the caller is interrupted before the thread has heard, a messenger goes on. Call it masked.
+-- the caller is interrupted before the thread has received the exception, a helper thread
+-- throws it. Call it masked.
 throwToOne :: Exception e => ThreadId -> e -> IO ()
 throwToOne thread e =
   inSimulation (throwTo thread e `onException` throwToAll (const e) [thread]) $ \simulation ->
     send simulation thread (toException e)
 
--- | 'interrupt' by messengers, who do the waiting: none of the threads hears it later
--- because another is slow to hear.
+-- | 'interrupt' by helper threads, which do the waiting: a thread that receives its exception
+-- late does not delay those of the others.
 --
--- One messenger does all the errands, until it has to wait. Then there is another for those
--- that are left: at most as many as there are threads to interrupt.
+-- One helper thread throws to all the targets, until it blocks. Then another is started for the
+-- remaining ones: at most as many helpers as there are targets.
 throwToAll :: Exception e => (ThreadId -> e) -> [ThreadId] -> IO ()
 throwToAll what targets =
   inSimulation byHelpers $ \simulation -> for_ targets $ \thread -> send simulation thread (toException (what thread))
@@ -207,7 +210,7 @@ throwToAll what targets =
       [] -> pure ()
       _ -> do
         helper <- forkIO (uninterruptibleMask_ (drain left))
-        when labelling $ labelThread helper (show (Label "interrupt" "messenger"))
+        when labelling $ labelThread helper (show (Label "interrupt" "helper"))
         yield
         spawnHelper others left
   drain left =
@@ -219,11 +222,11 @@ throwToAll what targets =
 liveThreadCount :: IO Int
 liveThreadCount = total threads
 
--- | Runs a transaction, waiting (without using the processor) while it retries.
+-- | Runs a transaction; while it retries, blocks without using the processor.
 --
--- It is 'Control.Concurrent.STM.atomically', by the door that this library uses
--- itself: what a behaviour waits for by this door, the library can see. Like
--- every wait it can be cancelled, also where exceptions are masked.
+-- Like stm's 'Control.Concurrent.STM.atomically', but visible to the simulator
+-- ("Behavior.Sim"); use it instead. Like every operation that blocks it can be cancelled, also
+-- where exceptions are masked.
 --
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar)
 -- >>> battery <- newTVarIO 80
@@ -236,29 +239,29 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
  where
   simulated simulation = transact simulation transaction
 
--- | Waits, unless a glance makes that needless: of those who wait for each other most are
--- done when they have had their turn, and to wait in a transaction is dear.
+-- | Tries to read, yields, tries again, then blocks. Most branches have ended after one yield,
+-- and to block in a transaction costs more than to yield.
 --
--- What the glance gives must be what the wait would have given, at some moment meanwhile:
--- it should look at one variable only. (In a simulation there is no glance.)
+-- What the first action reads must be what the second would have given at some moment
+-- meanwhile: it should read one variable only. (In a simulation only the second is run.)
 tryReadThenBlock :: IO (Maybe a) -> IO a -> IO a
 tryReadThenBlock tryRead block = inSimulation tryTwice (const (pure Nothing)) >>= maybe block pure
  where
   tryTwice = tryRead >>= maybe (yield >> tryRead) (pure . Just)
 
--- | A wait that nothing can interrupt. It goes on when GHC takes the thread for deadlocked: GHC
--- does so, too, while the cleanup that the thread waits for handles the same exception.
+-- | Waits uninterruptibly. It waits again when GHC takes the thread for deadlocked: GHC does
+-- that also while the cleanup that the thread waits for handles the same exception.
 awaitUninterruptibly :: IO a -> IO a
 awaitUninterruptibly block = uninterruptibleMask_ again
  where
   again = try block >>= either (\BlockedIndefinitelyOnSTM -> again) pure
 
--- | A moment at which the others may run, and a cancellation that is under way
--- arrives, if the masking state allows it.
+-- | A point at which other threads may run, and at which a pending cancellation is received,
+-- if the masking state allows it.
 --
--- In reality that is so at any moment, and this does nothing. In a simulation it
--- is so only where a behaviour does something by this library: put a checkpoint
--- where in between it matters (before and after a call to hardware, say).
+-- In reality every moment is such a point, and this does nothing. In a simulation only
+-- this library's operations are: put a checkpoint wherever else it matters (before and
+-- after a call to hardware, say).
 --
 -- >>> checkpoint
 --
@@ -266,8 +269,8 @@ awaitUninterruptibly block = uninterruptibleMask_ again
 checkpoint :: IO ()
 checkpoint = inSimulation (pure ()) pause
 
--- | Lets those run who were just started, or just asked for something: what they do at
--- once need not be waited for. (In a simulation the schedule says who runs.)
+-- | Yields to threads that were just started or interrupted, so that what they do at once need
+-- not be waited for. (In a simulation it does nothing: the schedule decides which thread runs.)
 yieldReal :: IO ()
 yieldReal = inSimulation yield (const (pure ()))
 
@@ -283,9 +286,9 @@ yieldReal = inSimulation yield (const (pure ()))
 now :: IO Seconds
 now = inSimulation (Seconds <$> getMonotonicTime) clock
 
--- | Waits for at least so many seconds, without using the processor.
+-- | Waits for at least the given number of seconds, without using the processor.
 --
--- Zero returns at once; an infinite number sleeps until it is cancelled. A
+-- Zero returns at once; with an infinite number it sleeps until it is cancelled. A
 -- negative number or NaN is refused with an 'ErrorCall' (a fault).
 --
 -- >>> sleep 0.001
@@ -299,46 +302,46 @@ sleep seconds = do
   _ <- duration "sleep" seconds
   when (seconds > 0) $ now >>= \t -> sleepBetween t (t + seconds)
 
--- | Sleeps until the clock shows the given moment, or a later one.
+-- | Sleeps until the given moment.
 sleepUntil :: Seconds -> IO ()
 sleepUntil moment@(Seconds time) =
-  inSimulation (getMonotonicTime >>= \t -> Alarm.sleepBetween t time) (`await` moment)
+  inSimulation (getMonotonicTime >>= \t -> Timer.sleepBetween t time) (`await` moment)
 
--- | Sleeps until the second moment. The first is what the clock shows now.
+-- | Sleeps until the second moment. The first is the current time.
 sleepBetween :: Seconds -> Seconds -> IO ()
-sleepBetween (Seconds t) moment@(Seconds time) = inSimulation (Alarm.sleepBetween t time) (`await` moment)
+sleepBetween (Seconds t) moment@(Seconds time) = inSimulation (Timer.sleepBetween t time) (`await` moment)
 
--- | Sleeps until a slot of so many seconds begins, and says when that is (in reality perhaps
--- a little later than asked for: see 'Alarm.sleepToSlot'). The second moment is now; a slot
--- that has begun by then is not waited for.
+-- | Sleeps until a slot begins, and gives the time when it begins. The arguments are the
+-- period, the current time, and when the slot should begin (in reality it may begin a little
+-- later: see 'Timer.sleepToSlot'). A slot that has already begun is not waited for.
 sleepToSlot :: Seconds -> Seconds -> Seconds -> IO Seconds
 sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time)
   | time <= t = pure slot
   | otherwise =
-      inSimulation (Seconds <$> Alarm.sleepToSlot every t time) (\simulation -> slot <$ await simulation slot)
+      inSimulation (Seconds <$> Timer.sleepToSlot every t time) (\simulation -> slot <$ await simulation slot)
 
--- | Reports every event to the given sink while the action runs. The sink is
--- called by the thread that the event is about, masked; it must not block.
+-- | While the action runs, every event is emitted to the given sink. The thread that the event
+-- is about calls the sink, masked; the sink must not block.
 withSink :: (Event -> IO ()) -> IO a -> IO a
 withSink sink =
   bracket_
     (writeIORef eventSink (Just sink) >> add sinks 1)
     (add sinks (-1) >> writeIORef eventSink Nothing)
 
--- | Says something that whoever watches should know.
+-- | Emits the text as an event, and adds it to the simulation's record.
 annotate :: String -> IO ()
 annotate text = emit (Annotated text) >> inSimulation (pure ()) (\simulation -> record simulation (Annotated text))
 
--- | Whether what happens now belongs to what a run is judged by. When a simulated run has
--- ended, what is left of it is unwound, which does not.
+-- | Whether events belong to the record by which a run is judged. After the end of a simulated
+-- run its remaining threads are unwound; that does not belong to the record.
 isRecorded :: IO Bool
 isRecorded = inSimulation (pure True) recording
 
--- | How to look at the clock of the simulation that the calling thread is part of, later too.
+-- | How to read the clock of the simulation that the calling thread is part of, later too.
 runClock :: IO (Maybe (IO Seconds))
 runClock = inSimulation (pure Nothing) (pure . Just . lookAtClock)
 
--- | Reports an event to the sink, if there is one.
+-- | Emits an event to the sink, if there is one.
 emit :: Event -> IO ()
 emit event = do
   n <- total sinks

@@ -3,16 +3,16 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Structured concurrency, once for all operators.
+-- Structured concurrency, implemented once for all operators.
 --
--- An operator starts branches in a 'Scope' and comes to a verdict. Then, however
--- it came to that, 'structured' keeps the promises that are the same everywhere:
+-- An operator starts branches in a 'Scope' and reaches a verdict. Then, whatever the
+-- verdict is, 'structured' keeps the promises that are the same for every operator:
 --
--- 1. What was started has ended, cleanup included, before the operator returns or
---    throws; nothing orphans it, not even a second cancellation.
--- 2. What has to stop is asked all at once, then waited for.
--- 3. The outcome is the first that there is of: what was thrown at the caller from
---    outside, the leftmost fault, the operator's verdict.
+-- 1. Everything that was started has ended, cleanup included, before the operator returns or
+--    throws; no branch is orphaned, not even by a second cancellation.
+-- 2. The stop of everything that has to stop is requested first; then the operator waits.
+-- 3. The outcome is the first that exists of: what was thrown at the caller from outside,
+--    the leftmost fault, the operator's verdict.
 --
 -- Users' code runs in branches, or where an operator catches what it throws. So an exception
 -- that reaches 'structured' was thrown at the caller from outside, whatever its type.
@@ -74,20 +74,20 @@ import Behavior.Internal.Runtime
 -- own thread starts, stops and forgets them.
 newtype Scope = Scope (IORef [SomeBranch])
 
--- | A behaviour that runs in a thread of its own on behalf of an operator.
+-- | A behaviour that an operator runs in a separate thread.
 data Branch a = Branch
   { branchThread :: {-# UNPACK #-} !(Thread (Outcome a))
   , stopRequested :: {-# UNPACK #-} !(IORef Bool)
-  -- ^ Whether it was asked to stop: nobody is asked twice, for the second
-  -- request would interrupt the cleanup that the first one began.
+  -- ^ Whether its stop was requested. That happens only once: a second request would interrupt
+  -- the cleanup that the first one began.
   }
 
--- | How the branch ended; retries until it has.
+-- | How the branch ended; retries until it has ended.
 outcome :: Branch a -> STM (Outcome a)
 outcome = threadEnd . branchThread
 
--- | How the branch ended, if it has. (To ask several branches so, one after the other, is
--- the same as 'orElse' between their outcomes, without its nested transactions.)
+-- | How the branch ended, if it has. (To read several branches with it, one after the other,
+-- is equivalent to 'orElse' between their outcomes, without its nested transactions.)
 tryReadOutcomeSTM :: Branch a -> STM (Maybe (Outcome a))
 tryReadOutcomeSTM = tryReadEndSTM . branchThread
 
@@ -99,31 +99,31 @@ data SomeBranch = forall a. SomeBranch (Branch a)
 
 -- | How a branch ended.
 data Outcome a
-  = -- | It returned, though perhaps it had been asked to stop.
+  = -- | It returned, perhaps although its stop was requested.
     Completed a
   | -- | It failed.
     Failing SomeException
   | -- | It threw anything else, perhaps while it was being stopped.
     Faulted SomeException
-  | -- | It was asked to stop and did.
+  | -- | Its stop was requested, and it stopped.
     Stopped SomeException
 
--- | Lets the body start branches and come to a verdict (an action that returns or
--- throws), stops what still runs, and gives the outcome.
+-- | Runs the body, which starts branches and gives a verdict (an action that returns or
+-- throws); stops the branches that still run, and gives the outcome.
 structured :: (Scope -> IO (IO a)) -> IO a
 structured body = do
   state <- getMaskingState
   mask $ \restore -> do
     scope <- Scope <$> newIORef []
-    -- (As @body scope@ it would be a thunk first, in every operator.)
+    -- (Written as @body scope@ it would be a thunk first, in every operator.)
     verdict <- try (restore (pure scope >>= body))
     (thrown, faults) <- stopAll scope state (either Just (const Nothing) verdict)
     deadlocked <- maybe (pure False) isDeadlock thrown
     case (thrown, faults) of
       (Just e, []) | not deadlocked -> throwIO e
       (Just e, fault : _) | not deadlocked -> withFault e fault
-      -- What was thrown at the caller while it could not be interrupted arrives here, and
-      -- not when the outcome has been thrown into some handler of the caller's.
+      -- An exception thrown at the caller while it could not be interrupted is received here,
+      -- and not later, when the outcome has been thrown into one of the caller's handlers.
       (_, []) -> restore checkpoint >> either throwIO id verdict
       (_, fault : _) -> do
         restore checkpoint `catch` \e -> withFault e fault
@@ -131,8 +131,8 @@ structured body = do
  where
   withFault e fault = defined e >>= \e' -> throwIO (StoppedWithFault e' fault)
 
--- | Whether GHC threw it because the thread waits for what will never come. It throws that to
--- a branch and to the operator that waits for it alike, so a fault of the branch comes first.
+-- | Whether GHC threw it because it detected a deadlock. GHC throws that both to a branch and
+-- to the operator that waits for the branch, so a fault of the branch comes first.
 isDeadlock :: SomeException -> IO Bool
 isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromException e) of
   (Just BlockedIndefinitelyOnSTM, _) -> True
@@ -142,11 +142,12 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 -- | Stops everything in the scope. Gives what has been thrown at the caller (before, or while
 -- this waits), and the faults from left to right.
 --
--- A caller that is not masked can be interrupted here until something was thrown at it: so a
--- cleanup may throw to it. After that it cannot, or branches would be orphaned; what is
--- thrown then stays pending, in GHC's own queue, from which it can be withdrawn. (To receive
--- it here and throw it again later would let a time limit reach what comes after its end.)
--- Neither can a caller that is masked: it must not lose the verdict.
+-- A caller that is not masked can be interrupted here, as long as nothing has been thrown at
+-- it: so a cleanup may throw to it. After that it cannot, or branches would be orphaned; a
+-- later exception stays pending, in GHC's own queue, from which it can be withdrawn. (If it
+-- were received here and thrown again later, a time limit could interrupt what comes after
+-- the end of that limit.)
+-- A caller that is masked cannot be interrupted here at all: it must not lose the verdict.
 stopAll :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
 stopAll (Scope branches) state before = do
   newestFirst <- readIORef branches
@@ -158,7 +159,7 @@ stopAll (Scope branches) state before = do
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)
-  -- Waits so that it can be interrupted; then so that it cannot.
+  -- Waits interruptibly until something is thrown; from then on uninterruptibly.
   interruptibleOnce thrown wait = case thrown of
     Nothing | state == Unmasked -> do
       waited <- try wait
@@ -173,12 +174,12 @@ stopAll (Scope branches) state before = do
 branch :: Scope -> Label -> IO a -> IO (Branch a)
 branch = branchWithHook (\_ -> pure ())
 
--- | The same; in the transaction that publishes how the branch ended, the given is done too.
+-- | Like 'branch'; the given transaction is part of the one that publishes how the branch ended.
 branchWithHook :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
 branchWithHook hook scope label act = launch scope (\_ -> startWith classify hook label act)
 
--- | Starts a branch that can see whether it was asked to stop. One that runs a
--- user's action in a loop must look: the action may have swallowed the request.
+-- | Starts a branch that can read whether its stop was requested. A branch that runs a user's
+-- action in a loop must read it: the action may have swallowed the request.
 worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
 worker scope label act = launch scope (startWith classify (\_ -> pure ()) label . act)
 
@@ -190,32 +191,32 @@ launch (Scope branches) startThread = mask_ $ do
   modifyIORef' branches (SomeBranch new :)
   pure new
 
--- | Takes a branch that has ended, and did not fault, out of the scope, which
--- otherwise would grow with every branch that an operator ever started.
+-- | Removes from the scope a branch that has ended and did not fault. Otherwise the scope
+-- would grow with every branch that an operator ever started.
 forget :: Scope -> Branch a -> IO ()
 forget (Scope branches) old = modifyIORef' branches without
  where
-  -- Strict: an unevaluated list would hold on to what was taken out of it.
+  -- Strict: an unevaluated list would keep a reference to the removed branch.
   without [] = []
   without (SomeBranch b : others)
     | branchId b == branchId old = others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
 
--- | Asks branches to stop, all at once, by threads of its own: none receives it later because
--- another cannot be interrupted just now. It does not wait until they have; so nothing that
--- interrupts the caller withdraws what it has asked for.
+-- | Requests the stop of all the branches together, by helper threads: a branch that cannot be
+-- interrupted at the moment does not delay the request of another. It does not wait until
+-- they have stopped; so an interruption of the caller withdraws no request.
 requestStopAsync :: [SomeBranch] -> IO ()
 requestStopAsync branches = mask_ $ claimStopRequests branches >>= throwToAll Stop
 
--- | The same for a caller that then waits for the end of them all, and can wait here, too: it
--- asks a single branch itself, which costs less.
+-- | Like 'requestStopAsync', for a caller that then waits for the end of all of them, and may
+-- block here, too: the request for a single branch needs no helper thread, and so costs less.
 requestStop :: [SomeBranch] -> IO ()
 requestStop branches = mask_ $
   claimStopRequests branches >>= \case
     [thread] -> throwToOne thread (Stop thread)
     threads -> throwToAll Stop threads
 
--- | Those that are still to be asked, which from now on count as asked.
+-- | The threads of the branches whose stop is still to be requested; marks it as requested.
 claimStopRequests :: [SomeBranch] -> IO [ThreadId]
 claimStopRequests = foldM requested []
  where
@@ -223,7 +224,7 @@ claimStopRequests = foldM requested []
     needed <- claimStopRequest b
     pure $! if needed then branchId b : threads else threads
 
--- | Marks a branch as asked. False if it was asked before, or has ended.
+-- | Marks the stop of a branch as requested. False if it was already, or the branch has ended.
 claimStopRequest :: Branch a -> IO Bool
 claimStopRequest b = do
   over <- isJust <$> tryReadEnd (branchThread b)
@@ -236,15 +237,15 @@ claimStopRequest b = do
 awaitOutcome :: Branch a -> IO (Outcome a)
 awaitOutcome b = tryReadThenBlock (tryReadOutcome b) (atomically (outcome b))
 
--- | How the branch has ended, if it has, at a glance.
+-- | How the branch ended, if it has. Does not block.
 tryReadOutcome :: Branch a -> IO (Maybe (Outcome a))
 tryReadOutcome = tryReadEnd . branchThread
 
--- | What the branch has returned, if it has.
+-- | What the branch returned, if it has. Does not block.
 completedNow :: Branch a -> IO (Maybe a)
 completedNow b = (>>= either (const Nothing) Just . result) <$> tryReadOutcome b
 
--- | The action that an outcome stands for.
+-- | The action that returns or throws as the branch did.
 outcomeToIO :: Outcome a -> IO a
 outcomeToIO = either throwIO pure . result
 
@@ -256,9 +257,9 @@ result = \case
   Faulted e -> Left e
   Stopped e -> Left e
 
--- | How a branch ended whose action ended so. It is called in the branch's own thread: an
--- exception may itself be undefined, and to look at it throws, which must happen to no
--- operator that still has branches. What that throws is the fault.
+-- | The outcome of a branch whose action ended like this. It is evaluated in the branch's own
+-- thread: an exception may itself be undefined, so that evaluating it throws, which must not
+-- happen in an operator that still has branches. What that evaluation throws is the fault.
 classify :: Either SomeException a -> IO (Outcome a)
 classify = \case
   Right a -> pure (Completed a)
@@ -279,20 +280,20 @@ classify = \case
 defined :: SomeException -> IO SomeException
 defined e = try (evaluate (forced e)) >>= either defined pure
 
--- | The exception; all that handlers match on is evaluated with it.
+-- | The exception; evaluating it also evaluates everything that handlers match on.
 forced :: SomeException -> SomeException
 forced e@(SomeException inner)
   | Just (BehaviorFailed failure) <- fromException e = failure `seq` e
   | Just (SomeAsyncException cancellation) <- fromException e = cancellation `seq` e
   | otherwise = inner `seq` e
 
--- | How an operator asks a branch to stop. It names the thread it is meant for: a
--- request that strays into another thread is not mistaken for that one's own.
+-- | The exception by which an operator requests the stop of a branch. It names the branch's
+-- thread: a request that reaches another thread is not taken for that thread's own.
 newtype Stop = Stop ThreadId
   deriving (Eq)
 
 instance Show Stop where
-  show (Stop _) = "Stop: the operator that started this behaviour no longer wants it"
+  show (Stop _) = "Stop: requested by the operator that started this behaviour"
 
 instance Exception Stop where
   toException = asyncExceptionToException

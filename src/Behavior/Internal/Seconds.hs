@@ -2,7 +2,7 @@
 {-# LANGUAGE GeneralizedNewtypeDeriving #-}
 
 -- |
--- Lengths of time, and moments.
+-- Durations and points in time.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Seconds
@@ -16,7 +16,7 @@ module Behavior.Internal.Seconds
 import Control.Exception (ErrorCall (..), throwIO)
 import Numeric (showFFloat)
 
--- | A length of time, or a moment on the clock of 'Behavior.Time.now', in seconds.
+-- | A duration, or a point in time on the clock of 'Behavior.Time.now', in seconds.
 -- Write it as a literal: @sleep 0.5@; turn other numbers into it with 'realToFrac'.
 --
 -- @since 0.1.0.0
@@ -24,7 +24,7 @@ newtype Seconds = Seconds Double
   deriving (Eq, Ord, Enum, Num, Fractional, Real, RealFrac)
 
 instance Show Seconds where
-  -- 0.05, and not 5.0e-2; but 5.0e-324
+  -- Shows 0.05 and not 5.0e-2, but still 5.0e-324.
   showsPrec precedence (Seconds s)
     | s /= 0, abs s < 1e-9 = showsPrec precedence s
     | otherwise = showParen (s < 0 && precedence > 6) (showFFloat Nothing s)
@@ -32,14 +32,14 @@ instance Show Seconds where
 instance Read Seconds where
   readsPrec precedence input = [(Seconds s, rest) | (s, rest) <- readsPrec precedence input]
 
--- | Refuses what is no duration: a negative number, or NaN.
+-- | Refuses a number that is no duration: a negative number, or NaN.
 duration :: String -> Seconds -> IO Seconds
 duration operator seconds
   | seconds >= 0 = pure seconds
   | otherwise = refuse operator "a duration is zero or more seconds" seconds
 
--- | Refuses what is no period: less than a microsecond, which the clock cannot tell from
--- none, or NaN.
+-- | Refuses a number that is no period: less than a microsecond, which the clock cannot
+-- distinguish from zero, or NaN.
 period :: String -> Seconds -> IO Seconds
 period operator seconds
   | seconds >= 0.000001 = pure seconds

@@ -2,7 +2,8 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- The reactive engine: runs what a signal's value says, and interrupts it when the value changes.
+-- The reactive engine: runs the branch for a signal's value, and interrupts it when the value
+-- changes.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Reactive.Engine
@@ -19,18 +20,18 @@ import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
 
--- | What to do for a value of the signal.
+-- | What an operator does for a value of the signal.
 data Reaction a
   = -- | Run this branch (with its name) until it ends or the value changes.
     Run String (Behavior a)
-  | -- | Run this branch to its end, with nothing watched, then begin again.
+  | -- | Run this branch to its end, without watching the signal, then begin again.
     RunToEnd String (Behavior ())
   | -- | Wait for another value.
     Idle
   | -- | End the operator.
     Conclude (IO a)
 
--- | What an operator works with for as long as it runs.
+-- | The parts of a running operator that do not change.
 data Engine k a = Engine
   { operator :: String
   , scope :: Scope
@@ -44,42 +45,41 @@ data Wakeup k a
   | Changed k !(Reaction a)
   | SensorDied SomeException
 
--- | Why a branch is stopped: what is to come once it has ended.
+-- | Why a branch is stopped: what the operator does after the branch has ended.
 data Interruption a
   = Reselect
   | Recover String (Behavior ())
   | Finish (IO a)
 
--- | Runs what the reaction to the signal's value says, and switches when it says
--- something else.
+-- | Runs the reaction to the signal's value, and changes to another reaction when the value
+-- changes.
 react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react name signal toReaction = do
-  -- (Before any branch is started: what opening throws needs no care.)
+  -- (No branch has been started yet: what 'open' throws is simply thrown.)
   opened <- open (suppressEqual signal) everyValue
   structured $ \within ->
     startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction} FirstRead
 
--- | Starts the sensors, and looks.
+-- | Starts the sensors, and reads the signal.
 startOver :: Eq k => Engine k a -> ReadMode -> IO (IO a)
 startOver engine how = do
   (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
   select engine sensors seen how
 
--- | Nothing runs: reads, and does what the value says now.
+-- | Reads the signal, and does what its value requires. No branch runs.
 select :: Eq k => Engine k a -> Sensors -> View k -> ReadMode -> IO (IO a)
 select engine sensors seen how =
   atomically (readWakeup engine sensors (readView how seen)) >>= applyReaction engine sensors seen
 
--- | What a look at the signal says. It runs users' code (views, functions, equality): what that
--- throws is caught here, so that what is thrown elsewhere in the operator's thread came from
--- outside.
+-- | Reads the signal. That runs users' code (views, functions, equality): what that code throws
+-- is caught here, so that any other exception in the operator's thread came from outside.
 readWakeup :: Engine k a -> Sensors -> STM k -> STM (Wakeup k a)
 readWakeup engine sensors value =
   sensorError sensors >>= \case
     Just dead -> pure (SensorDied dead)
     Nothing -> (value >>= \k -> pure $! Changed k (reaction engine k)) `catchSTM` (pure . SensorDied)
 
--- | Does what the wakeup says; no branch runs.
+-- | Does what the wakeup requires. No branch runs.
 applyReaction :: Eq k => Engine k a -> Sensors -> View k -> Wakeup k a -> IO (IO a)
 applyReaction engine sensors seen = \case
   BranchEnded end -> pure (outcomeToIO end)
@@ -91,8 +91,8 @@ applyReaction engine sensors seen = \case
   Changed old Idle -> atomically (awaitChange old) >>= applyReaction engine sensors seen
   Changed old (Run name act) -> do
     running <- branch (scope engine) (Label (operator engine) name) act
-    -- The branch is looked at first: one that has ended by itself is not
-    -- interrupted, whatever the signal says in the same transaction.
+    -- The branch is read first: one that has ended by itself is not interrupted, whatever
+    -- the signal's value is in the same transaction.
     wakeup <-
       tryReadThenBlock (fmap BranchEnded <$> tryReadOutcome running) . atomically $
         tryReadOutcomeSTM running >>= maybe (awaitChange old) (pure . BranchEnded)
@@ -106,7 +106,7 @@ applyReaction engine sensors seen = \case
  where
   awaitChange old = readWakeup engine sensors (reread seen >>= \new -> new <$ check (new /= old))
 
--- | Stops the branch. If it completes all the same, it has completed, and that is the end.
+-- | Stops the branch. If it completes nevertheless, its result is that of the operator.
 interrupt :: Eq k => Engine k a -> Sensors -> Branch a -> Interruption a -> IO (IO a)
 interrupt engine sensors running = \case
   Finish verdict ->
@@ -117,11 +117,11 @@ interrupt engine sensors running = \case
     stopBranch sensors' >>= \case
       Completed a -> pure (pure a)
       Stopped _ -> forget (scope engine) running >> recover engine sensors name recovery Nothing
-      -- A cleanup that went wrong must not keep the robot from its charger.
+      -- A cleanup that threw must not keep the robot from its charger.
       wrong -> recover engine sensors name recovery (Just (outcomeToIO wrong))
   Reselect ->
     stopBranch [] >>= \case
-      -- Read again: by now the value may be another, or the old one again.
+      -- Read again: meanwhile the value may have changed again, perhaps back to the old one.
       Stopped _ -> do
         forget (scope engine) running
         seen <- atomically (view (source engine))
@@ -129,11 +129,11 @@ interrupt engine sensors running = \case
       end -> pure (outcomeToIO end)
  where
   sensors' = map SomeBranch sensors
-  -- It waits for the branch, but not for the others.
+  -- Waits for the branch, but not for the others.
   stopBranch others = requestStopAsync others >> requestStop [SomeBranch running] >> awaitOutcome running
 
--- | Runs the recovery to its end. The sensors were asked to stop: it does not wait for
--- those that are slow to, but what comes after it does.
+-- | Runs the recovery to its end. The sensors' stop has been requested: the recovery does not
+-- wait for those that are slow to stop, but what comes after it does.
 recover :: Eq k => Engine k a -> Sensors -> String -> Behavior () -> Maybe (IO a) -> IO (IO a)
 recover engine sensors name recovery taskOutcome = do
   recovered <- branch (scope engine) (Label (operator engine) name) recovery

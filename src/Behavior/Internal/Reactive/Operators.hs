@@ -2,7 +2,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- The reactive operators: each is a few lines on the engine.
+-- The reactive operators: each is a few lines that use the reactive engine.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Reactive.Operators
@@ -14,7 +14,7 @@ module Behavior.Internal.Reactive.Operators
   , switch
   , teleoReactive
 
-    -- * Waiting for a condition, and holding to one
+    -- * Waiting for a condition, and requiring one
   , waitUntil
   , whileHolding
   ) where
@@ -31,24 +31,24 @@ import Behavior.Internal.Signal.Source
 -- >>> import qualified Behavior.Signal as Signal
 
 -- | A reactive @if@: runs @left@ while the condition is true and @right@ while it
--- is false, and switches whenever it changes.
+-- is false, and changes from one to the other whenever the condition changes.
 --
 -- > rSelect (pure True) left right  =  left
 -- > rSelect condition left right    =  switch condition (\c -> if c then left else right)
 --
--- The condition is read before anything starts. When it changes, the branch that
--- runs is stopped; when that has ended, cleanup included, the condition is read
--- again, and what it says then starts (perhaps the same branch, anew).
+-- The condition is read before anything starts. When it changes, the running branch is
+-- stopped; when that has ended, cleanup included, the condition is read again, and the
+-- branch for its value starts (perhaps the same branch, from its beginning).
 --
--- [Result] That of the branch that completed, also of one that was asked to stop
---   and completed all the same.
+-- [Result] That of the branch that completed, also of one that completed although its stop
+--   was requested.
 -- [Failure] A branch that fails, also while it is being stopped, ends the
---   operator with its failure. A condition that fails, or that has no value any
---   more, is not \"false\": the branch is stopped and the operator fails.
--- [Fault] Of a branch or the condition, also while stopping: thrown, after all has
+--   operator with its failure. A condition that fails, or that no longer has a
+--   value, is not \"false\": the branch is stopped and the operator fails.
+-- [Fault] Of a branch or the condition, also while stopping: thrown, after everything has
 --   ended. Nothing else starts.
--- [Cancellation] The branch and the sensors are asked to stop at once; it returns
---   after they have ended.
+-- [Cancellation] Requests the stop of the branch and the sensors together; returns after
+--   they have ended.
 --
 -- >>> Signal.rSelect (pure True) (pure "left") (pure "right")
 -- "left"
@@ -68,20 +68,20 @@ rSelect condition left right = react "rSelect" condition $ \case
 --
 -- The condition is read before anything starts. When it is true, that is latched:
 -- the task is stopped, and when it has ended, cleanup included, @recovery@ runs to
--- completion while nothing watches the condition, even if it has become false by
--- then. After that it is read afresh; the task restarts from its beginning.
+-- completion while the condition is not watched, even if it has become false by
+-- then. After that it is read again; the task restarts from its beginning.
 --
--- [Result] That of the task, also if it was asked to stop and completed all the
---   same; then the recovery does not run.
+-- [Result] That of the task, also if it completed although its stop was requested; then the
+--   recovery does not run.
 -- [Failure] Of the task or the recovery: ends the operator with it. If the task
---   fails /while it is being stopped/, the recovery runs first: a cleanup that goes
---   wrong must not keep the robot from its charger. A condition that fails, or
---   that has no value any more, is not \"false\": the task is stopped and the
+--   fails /while it is being stopped/, the recovery runs first: a cleanup that
+--   fails must not keep the robot from its charger. A condition that fails, or
+--   that no longer has a value, is not \"false\": the task is stopped and the
 --   operator fails.
 -- [Fault] Likewise.
 -- [Cancellation] Only the caller can interrupt the recovery; so an outer 'monitor'
---   outranks an inner one. All is asked to stop at once; it returns after all has
---   ended.
+--   outranks an inner one. Requests the stop of everything together; returns after everything
+--   has ended.
 --
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 -- >>> battery <- newTVarIO (5 :: Int)
@@ -100,7 +100,7 @@ monitor condition recovery task = react "monitor" condition $ \case
 
 -- | 'rSelect' with a branch for each value of any type.
 --
--- All that is said of 'rSelect' holds.
+-- Everything that is documented for 'rSelect' holds here too.
 --
 -- >>> Signal.switch (pure "dock") (\mode -> putStrLn ("in mode " ++ mode))
 -- in mode dock
@@ -113,8 +113,8 @@ switch signal behavior = react "switch" signal (Run "branch" . behavior)
 -- none holds, it waits.
 --
 -- When an earlier condition becomes true, or the rule's own becomes false, the
--- running behaviour is stopped, the conditions are read again, and the first that
--- holds then decides. All that is said of 'rSelect' holds.
+-- running behaviour is stopped, the conditions are read again, and the first one that
+-- then holds decides. Everything that is documented for 'rSelect' holds here too.
 --
 -- >>> Signal.teleoReactive [(pure False, pure "flee"), (pure True, pure "graze")]
 -- "graze"
@@ -131,7 +131,7 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
 
 -- | Waits until the condition holds; returns at once if it does.
 --
--- A condition that fails, faults or has lost its value makes it throw the same.
+-- If the condition fails, faults or no longer has a value, it throws the same.
 --
 -- >>> Signal.waitUntil (pure True)
 --
@@ -141,15 +141,14 @@ waitUntil condition = react "waitUntil" condition $ \case
   True -> Conclude (pure ())
   False -> Idle
 
--- | Runs the behaviour while the condition holds, and fails when it does not, at
--- the start or later.
+-- | Runs the behaviour while the condition holds, and fails if the condition does not
+-- hold, at the start or later.
 --
--- [Result] The behaviour's, also if it was asked to stop and completed all the
---   same.
--- [Failure] When the condition does not hold: 'Behavior.FailedBecause' says so. The
+-- [Result] The behaviour's, also if it completed although its stop was requested.
+-- [Failure] When the condition does not hold: a 'Behavior.FailedBecause' with that reason. The
 --   behaviour's own failure, also while it is being stopped, is thrown instead.
 -- [Fault] Of the behaviour or the condition, also while stopping: thrown.
--- [Cancellation] All is asked to stop at once; it returns after all has ended.
+-- [Cancellation] Requests the stop of everything together; returns after everything has ended.
 --
 -- >>> Signal.whileHolding (pure False) (putStrLn "grip") ? putStrLn "lost it"
 -- lost it

@@ -16,28 +16,28 @@ import qualified Behavior.Internal.Reactive.Operators as Signal
 import Behavior.Internal.Runtime (Seconds)
 import qualified Behavior.Internal.Signal.Polling as Signal
 
--- | A reactive @if@: reads @test@ again and again, runs @left@ while it is true and
--- @right@ while it is false, and switches whenever it changes.
+-- | A reactive @if@: reads @test@ repeatedly, runs @left@ while it is true and
+-- @right@ while it is false, and changes from one to the other whenever it changes.
 --
 -- > rSelect (pure True) left right  =  left
 -- > rSelect test left right         =  Signal.rSelect (Signal.polling 0.01 test) left right
 --
--- @left@ and @right@ never run at the same time: the one has ended, cleanup
--- included, before the other starts. @test@ runs in a thread of its own, one reading
+-- @left@ and @right@ never run at the same time: one has ended, cleanup
+-- included, before the other starts. @test@ runs in its own thread, one reading
 -- at a time, and readings start at least 10 ms apart.
 --
 -- [Result] That of the branch that completed.
 -- [Failure] Of a branch or the test: ends the operator with it. A test that fails
 --   is not \"false\".
 -- [Fault] Likewise.
--- [Cancellation] Branch and test are asked to stop at once; it returns after both
+-- [Cancellation] Requests the stop of the branch and the test together; returns after both
 --   have ended.
 --
 -- >>> rSelect (pure False) (putStrLn "turn") (putStrLn "move forward")
 -- move forward
 --
--- 'Behavior.Signal.rSelect' says all of this exactly, and reacts at once to
--- conditions that need no polling.
+-- The documentation of 'Behavior.Signal.rSelect' has the details. That operator reacts at
+-- once to conditions that need no polling.
 --
 -- /Definition 3.1 and Section 5 of the paper./
 --
@@ -45,24 +45,23 @@ import qualified Behavior.Internal.Signal.Polling as Signal
 rSelect :: Behavior Bool -> Behavior a -> Behavior a -> Behavior a
 rSelect test = Signal.rSelect (Signal.polling defaultPeriod test)
 
--- | One-sided interruption: runs @task@ and reads @test@ again and again; whenever
+-- | One-sided interruption: runs @task@ and reads @test@ repeatedly; whenever
 -- it is true, stops the task, runs @recovery@ to completion, and begins again.
 --
 -- > monitor (pure False) recovery task  =  task
 -- > monitor test recovery task          =  Signal.monitor (Signal.polling 0.01 test) recovery task
 --
--- The recovery starts after the task has ended, cleanup included; nothing reads
--- @test@ while it runs, and nothing but the caller interrupts it. @test@ runs in a
--- thread of its own, one reading at a time, and readings start at least 10 ms
--- apart.
+-- The recovery starts after the task has ended, cleanup included; @test@ is not read
+-- while it runs, and only the caller can interrupt it. @test@ runs in its own
+-- thread, one reading at a time, and readings start at least 10 ms apart.
 --
--- [Result] That of the task. If it completed although it was asked to stop, it has
+-- [Result] That of the task. If the task completes although its stop was requested, it has
 --   completed, and no recovery runs.
 -- [Failure] Of the task, the recovery or the test: ends the operator with it. A
 --   test that fails is not \"false\". If the task fails while it is being stopped,
 --   the recovery runs first.
 -- [Fault] Likewise.
--- [Cancellation] All is asked to stop at once; it returns after all has ended.
+-- [Cancellation] Requests the stop of everything together; returns after everything has ended.
 --
 -- >>> import Data.IORef
 -- >>> battery <- newIORef (5 :: Int)
@@ -71,8 +70,8 @@ rSelect test = Signal.rSelect (Signal.polling defaultPeriod test)
 -- recharge
 -- perform the task
 --
--- 'Behavior.Signal.monitor' says all of this exactly, and reacts at once to
--- conditions that need no polling.
+-- The documentation of 'Behavior.Signal.monitor' has the details. That operator reacts at
+-- once to conditions that need no polling.
 --
 -- /Definition 3.2 and Section 5 of the paper./
 --

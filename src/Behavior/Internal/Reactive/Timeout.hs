@@ -2,7 +2,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Limits of time.
+-- Time limits.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Reactive.Timeout
@@ -26,16 +26,16 @@ import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), c
 -- $setup
 -- >>> import Behavior (sleep, (?))
 
--- | Runs the behaviour for at most so many seconds, and fails with 'TimedOut' when
--- it takes longer.
+-- | Runs the behaviour for at most the given number of seconds, and fails with 'TimedOut'
+-- when it takes longer.
 --
--- [Result] The behaviour's; one that is there when time is up, or that the
---   behaviour returns although it was asked to stop, is kept.
+-- [Result] The behaviour's. A result that exists when the time is up, or that the
+--   behaviour returns although its stop was requested, is kept.
 -- [Failure] 'TimedOut', or the behaviour's own.
 -- [Fault] Of the behaviour, also while it is being stopped: thrown.
--- [Cancellation] The behaviour is asked to stop; it returns after that has ended.
+-- [Cancellation] Requests the behaviour's stop; returns after the behaviour has ended.
 --
--- With zero seconds the behaviour is not started. A negative number or NaN is
+-- With zero seconds, the behaviour is not started. A negative number or NaN is
 -- refused with an 'Control.Exception.ErrorCall' (a fault); an infinite one is no limit.
 --
 -- It returns when the behaviour has ended, cleanup included; so a slow cleanup
@@ -55,7 +55,7 @@ timeout seconds behavior = do
     True -> Conclude (throwIO (TimedOut limit))
     False -> Run "branch" behavior
 
--- | The failure of a behaviour that took longer than so many seconds.
+-- | The failure of a behaviour that took longer than the given number of seconds.
 --
 -- @since 0.1.0.0
 newtype TimedOut = TimedOut Seconds
@@ -66,7 +66,7 @@ instance Exception TimedOut where
   fromException = behaviorFailedFromException
   displayException (TimedOut limit) = "timed out after " ++ show limit ++ " s"
 
--- | False until so many seconds have passed since it was opened.
+-- | False until the given number of seconds has passed since the signal was opened.
 elapsed :: Seconds -> Signal Bool
 elapsed seconds = Signal $ \_ -> do
   over <- newTVarIO (seconds <= 0)

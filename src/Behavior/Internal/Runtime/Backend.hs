@@ -2,7 +2,7 @@
 {-# LANGUAGE RankNTypes #-}
 
 -- |
--- What the two sides of the seam speak of, and what a simulation does for its threads.
+-- The types of the seam, and the operations that a simulation backend implements.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime.Backend
@@ -18,7 +18,7 @@ import Control.Exception (SomeException)
 
 import Behavior.Internal.Seconds (Seconds)
 
--- | Who started a thread, and what runs in it: @Label "monitor" "task"@.
+-- | The operator that started a thread, and what runs in it: @Label "monitor" "task"@.
 data Label = Label
   { labelOperator :: String
   , labelBranch :: String
@@ -29,34 +29,35 @@ instance Show Label where
   show (Label operator "") = operator
   show (Label operator branch) = operator ++ ": " ++ branch
 
--- | What can be reported of the life of a behaviour.
+-- | What is emitted while behaviours run.
 data Event
   = Started Label
   | Ended Label
-  | -- | What a behaviour says of itself.
+  | -- | A text that a behaviour emits.
     Annotated String
   deriving (Eq, Ord, Show)
 
--- | How a simulation does what its threads ask of the seam.
+-- | The simulation backend: how a simulation does the operations of its threads.
 data Simulator = Simulator
   { isRunning :: ThreadId -> IO Bool
-  -- ^ Whether this is the one thread of the simulation that runs just now.
+  -- ^ Whether this is the one thread of the simulation that runs at the moment.
   , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO (Async ())
-  -- ^ Starts a thread, masked, and publishes what it gives as it ends. The thread is given
-  -- an action to begin with, in which an early cancellation arrives, and how to unmask.
+  -- ^ Starts a thread, masked, and publishes its result when it ends. The thread is given an
+  -- action to run first, in which an early cancellation is received, and a function to unmask.
   , deliver :: ThreadId -> SomeException -> IO ()
-  -- ^ Throws to a thread and waits until it has heard it.
+  -- ^ Throws to a thread, and waits until the thread has received it.
   , send :: ThreadId -> SomeException -> IO ()
-  -- ^ Throws to a thread, some time, and does not wait.
+  -- ^ Throws to a thread at some later step, and does not wait.
   , transact :: forall a. STM a -> IO a
   , clock :: IO Seconds
   , await :: Seconds -> IO ()
   -- ^ Waits until that moment.
   , pause :: IO ()
-  -- ^ Lets the others run, and lets a cancellation arrive.
+  -- ^ Lets other threads run, and lets a pending cancellation be received.
   , recording :: IO Bool
-  -- ^ Whether the run goes on, and what happens belongs to its record.
+  -- ^ Whether the run goes on, so that events belong to its record.
   , lookAtClock :: IO Seconds
-  -- ^ What time it is, or was when the run ended; no operation, for any thread at any time.
+  -- ^ The current time, or the time when the run ended. Not an operation of the simulation: any
+  -- thread may read it at any time.
   , record :: Event -> IO ()
   }

@@ -1,8 +1,8 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What there is in this process, counted. Many threads change a number at once, and to read
--- one takes a single instruction.
+-- Counters of this process. Many threads change them at the same time, and reading one takes a
+-- single instruction.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime.Counter
@@ -18,15 +18,15 @@ module Behavior.Internal.Runtime.Counter
 
 import Foreign (Ptr, peek)
 
--- | A number in a place of its own, which is zero at first.
+-- | A counter, which is zero at first.
 newtype Counter = Counter (Ptr Int)
 
--- | Adds to it, in one step.
+-- | Adds to the counter, atomically.
 foreign import ccall unsafe "behavior_lang_add" add :: Counter -> Int -> IO ()
 
--- | The number that it has now.
+-- | The current value.
 total :: Counter -> IO Int
-total (Counter place) = peek place
+total (Counter pointer) = peek pointer
 
 -- | The threads started by this library that have not ended.
 foreign import ccall "&behavior_lang_threads" threads :: Counter
@@ -34,5 +34,5 @@ foreign import ccall "&behavior_lang_threads" threads :: Counter
 -- | The simulations that run.
 foreign import ccall "&behavior_lang_simulations" simulations :: Counter
 
--- | Where events are reported to.
+-- | The sinks to which events are emitted.
 foreign import ccall "&behavior_lang_sinks" sinks :: Counter

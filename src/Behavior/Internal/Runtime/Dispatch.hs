@@ -2,11 +2,10 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The switch in the seam: whether an operation is done in reality or in a
--- simulation.
+-- The dispatch of the seam: whether an operation is done in reality or in a simulation.
 --
--- A simulation takes over the operations of its own threads, and of no others.
--- While none runs, the switch costs one look at a number.
+-- A simulation does the operations of its own threads, and of no others.
+-- While no simulation runs, the dispatch costs one read of a counter.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime.Dispatch
@@ -23,12 +22,12 @@ import System.IO.Unsafe (unsafePerformIO)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Counter
 
--- | The simulations that run in this process. They do not know of each other.
+-- | The simulations that run in this process. They are independent of each other.
 simulators :: IORef [(Int, Simulator)]
 simulators = unsafePerformIO (newIORef [])
 {-# NOINLINE simulators #-}
 
--- | Does the first in reality, and the second in a simulation.
+-- | Runs the first in reality, and the second in a simulation.
 inSimulation :: IO a -> (Simulator -> IO a) -> IO a
 #if defined(SEAMLESS)
 inSimulation really _ = really
@@ -44,19 +43,19 @@ simulator = do
   if running == 0 then pure Nothing else currentBackend
 {-# INLINE simulator #-}
 
--- | The simulation in which the calling thread has the turn. (Not inlined: what is done while
--- no simulation runs is to be short, and to allocate nothing.)
+-- | The simulation whose running thread is the calling thread. (Not inlined: the code that runs
+-- while there is no simulation should be short, and allocate nothing.)
 currentBackend :: IO (Maybe Simulator)
-currentBackend = readIORef simulators >>= whose . map snd
+currentBackend = readIORef simulators >>= search . map snd
  where
-  whose [] = pure Nothing
-  whose (s : others) = do
+  search [] = pure Nothing
+  search (s : others) = do
     mine <- isRunning s =<< myThreadId
-    if mine then pure (Just s) else whose others
+    if mine then pure (Just s) else search others
 {-# NOINLINE currentBackend #-}
 
--- | Lets a simulation (each has a number of its own) take over its threads'
--- operations while the action runs.
+-- | While the action runs, the operations of the simulation's threads are dispatched to it. (The
+-- number identifies the simulation.)
 withBackend :: Int -> Simulator -> IO a -> IO a
 withBackend number s =
   bracket_

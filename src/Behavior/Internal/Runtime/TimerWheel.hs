@@ -1,18 +1,19 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Waking at a given time, for many sleepers and without a timer for each.
+-- A timer wheel: wakes many threads at given times, without a timer of the system for each.
 --
--- Who sleeps waits at a gate, with all others who want to wake in the same tick; a clock
--- opens the gates that are due. To lie down and to be woken costs what a lookup and an
--- 'MVar' cost, and to be interrupted costs nothing: there is nothing to take back.
+-- All sleepers that are due in the same tick share a bucket, an 'MVar'; a timer fills the
+-- buckets that are due. To sleep and be woken costs a lookup and an 'MVar'; to cancel a sleep
+-- costs nothing, because it unregisters nothing.
 --
--- Who is interrupted leaves a place in the gate's queue until it opens. Therefore nobody
--- waits at a gate that is farther away than he has slept already, or than a second: what is
--- left of a short sleep is gone within a second, and of a long one within its length.
+-- A cancelled sleeper leaves an entry in the bucket's queue until the bucket is filled.
+-- Therefore no thread waits at a bucket that is farther away than one second, or than it has
+-- slept so far if that is longer: the entry of a cancelled short sleep is gone within a
+-- second, and that of a long one within the time that it had slept.
 --
--- (A process that was made by @forkProcess@ while another thread slept has that one's
--- clock, but nobody who keeps it: there nothing wakes.)
+-- (A process made by @forkProcess@ while another thread slept has a copy of the armed timers,
+-- but not the threads that run them: nothing wakes there.)
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime.TimerWheel
@@ -36,36 +37,35 @@ import GHC.Clock (getMonotonicTime)
 import GHC.Conc (labelThread)
 import System.IO.Unsafe (unsafePerformIO)
 
--- | All that sleeps in this process.
-data Alarms = Alarms
+-- | The state of the timer wheel of this process.
+data Wheel = Wheel
   { buckets :: !(IntMap (MVar ()))
-  -- ^ One for each tick in which somebody wants to wake. It is opened once.
+  -- ^ One for each tick in which a sleeper is due. It is filled once.
   , armedTimers :: ![Tick]
-  -- ^ When the clocks go off, the earliest first. One that is set is never stopped: when
-  -- somebody wants to wake earlier, another is set.
+  -- ^ When the armed timers expire, the earliest first. An armed timer is never cancelled: for a
+  -- sleeper that is due earlier another one is armed.
   }
 
-alarms :: IORef Alarms
-alarms = unsafePerformIO (newIORef (Alarms IntMap.empty []))
-{-# NOINLINE alarms #-}
+wheel :: IORef Wheel
+wheel = unsafePerformIO (newIORef (Wheel IntMap.empty []))
+{-# NOINLINE wheel #-}
 
--- | Sleeps from now, as 'getMonotonicTime' tells it, until it tells the second time or a
--- later one.
+-- | Sleeps until the second time. The first is now. (Both are times of 'getMonotonicTime'.)
 sleepBetween :: Double -> Double -> IO ()
 sleepBetween from to = when (to > from) $ sleepTicks (tick floor from) (tick ceiling (min to (forever from)))
 
--- | Sleeps from now until the beginning of a slot, for who does that in every period, and
--- gives the time of it.
+-- | Sleeps from now until the beginning of a slot, in a sequence of slots of the given period,
+-- and gives the time of that beginning.
 sleepToSlot :: Double -> Double -> Double -> IO Double
 sleepToSlot period from to = slot <$ sleepBetween from slot
  where
   slot = slotTime period from to
 
--- | When the slot begins that was asked for: up to a tenth of the period later, so that all
--- who have the same period wake together, ten times in a period at most.
+-- | When the slot begins that is due at the third time: up to a tenth of the period later, so
+-- that all sleepers with the same period are woken together, at most ten times in a period.
 --
--- (A slot is counted in tenths since the clock's beginning, and not from the slot before:
--- what is rounded does not add up.)
+-- (A slot's beginning is counted in tenths of the period since time zero, and not from the slot
+-- before: so rounding errors do not add up.)
 slotTime :: Double -> Double -> Double -> Double
 slotTime period from to
   | to > from && to < forever from && tenth > epsilon = tenth * fromIntegral (ceiling ((to - epsilon) / tenth) :: Int)
@@ -82,16 +82,16 @@ sleepTicks from end = go from
     bucketAt next >>= readMVar
     when (next < end) $ go next
 
--- | Where to wait next, having slept until the third, when it is to be from the first until
--- the second.
+-- | The tick of the bucket to wait at next, in a sleep from the first tick until the second that
+-- has lasted until the third.
 nextBucket :: Tick -> Tick -> Tick -> Tick
 nextBucket from end t = t + min (end - t) (max ticksPerSecond (t - from))
 
--- | A century from now is as good as for ever, and can be counted.
+-- | About a century from now. It stands for an infinite time, and can be counted in ticks.
 forever :: Double -> Double
 forever from = from + 3e9
 
--- | A moment, counted in eighths of a millisecond: finer than GHC's clocks can tell.
+-- | A moment, counted in eighths of a millisecond: finer than the resolution of GHC's timers.
 type Tick = Int
 
 tick :: (Double -> Tick) -> Double -> Tick
@@ -100,60 +100,61 @@ tick rounded seconds = rounded (seconds * fromIntegral ticksPerSecond)
 ticksPerSecond :: Tick
 ticksPerSecond = 8000
 
--- | The gate that opens at the tick.
+-- | The bucket of the tick.
 bucketAt :: Tick -> IO (MVar ())
-bucketAt t = readIORef alarms >>= maybe (newBucket t) pure . IntMap.lookup t . buckets
+bucketAt t = readIORef wheel >>= maybe (newBucket t) pure . IntMap.lookup t . buckets
 
 newBucket :: Tick -> IO (MVar ())
 newBucket t = mask_ $ do
   new <- newEmptyMVar
-  (bucket, unclocked) <- atomicModifyIORef' alarms $ \known ->
+  (bucket, needsTimer) <- atomicModifyIORef' wheel $ \known ->
     case IntMap.lookup t (buckets known) of
       Just old -> (known, (old, False))
       Nothing
-        | t `isBeforeAll` armedTimers known -> (Alarms others (t : armedTimers known), (new, True))
+        | t `isBeforeAll` armedTimers known -> (Wheel others (t : armedTimers known), (new, True))
         | otherwise -> (known {buckets = others}, (new, False))
        where
         others = IntMap.insert t new (buckets known)
-  when unclocked . void . forkIO $ do
+  when needsTimer . void . forkIO $ do
     self <- myThreadId
-    labelThread self "clock"
-    clock t t
+    labelThread self "timer"
+    runTimer t t
   pure bucket
 
 isBeforeAll :: Tick -> [Tick] -> Bool
 isBeforeAll t = all (t <) . take 1
 
--- | Goes off at the tick, or a little later as the second one says. Then it is set for the
--- next gate, unless another goes off before.
-clock :: Tick -> Tick -> IO ()
-clock t later = do
+-- | Expires at the tick, or not before the second one if that is a little later. Then the timer
+-- is armed for the next bucket, unless another timer expires before.
+runTimer :: Tick -> Tick -> IO ()
+runTimer t later = do
   getMonotonicTime >>= delay
   current <- tick floor <$> getMonotonicTime
-  (due, next) <- atomicModifyIORef' alarms (expire current)
+  (due, next) <- atomicModifyIORef' wheel (expire current)
   traverse_ (`putMVar` ()) due
-  -- First those who were woken: if they have gone to sleep again when this thread does,
-  -- the system has no thread to wake for them.
+  -- The woken threads run first: if they sleep again before this thread does, the system does
+  -- not have to wake a thread for them.
   yield
-  -- (Not by 'Data.Foldable.for_', which would come back: the clock's stack would grow.)
-  maybe (pure ()) (\t' -> clock t' (max t' (current + minTimerGap))) next
+  -- (Not by 'Data.Foldable.for_', which would return here: this thread's stack would grow.)
+  maybe (pure ()) (\t' -> runTimer t' (max t' (current + minTimerGap))) next
  where
   delay now = when (left > 0) $ sleepFor left >> getMonotonicTime >>= delay
    where
     left = fromIntegral later / fromIntegral ticksPerSecond - now
-  expire current known = (Alarms future (maybe others (: others) next), (IntMap.elems past ++ toList now, next))
+  expire current known = (Wheel future (maybe others (: others) next), (IntMap.elems past ++ toList now, next))
    where
     (past, now, future) = IntMap.splitLookup current (buckets known)
     others = delete t (armedTimers known)
     next = IntMap.lookupMin future >>= \(at, _) -> if at `isBeforeAll` others then Just at else Nothing
 
--- | How long a clock rests at least, for all who want to wake meanwhile.
+-- | The shortest time between two expirations of a timer; sleepers due in between are woken
+-- together.
 minTimerGap :: Tick
 minTimerGap = 6
 
--- | Sleeps for about so many seconds; the last stretch by the system's sleep, which is more
--- exact than GHC's, and not so dear to set. (It keeps a thread of the system busy, and
--- where there is only one, that must not be.)
+-- | Sleeps for about the given number of seconds. Below 50 ms by the system's sleep, which is
+-- more exact than GHC's, and costs less to start. (It occupies a thread of the system; with the
+-- non-threaded runtime there is only one, so there GHC's is used.)
 sleepFor :: Double -> IO ()
 sleepFor seconds
   | not rtsSupportsBoundThreads = threadDelay (microseconds (min aDay seconds))

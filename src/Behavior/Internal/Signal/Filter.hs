@@ -2,7 +2,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Signals that do not follow every flicker.
+-- Signals that ignore brief or small changes.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Signal.Filter
@@ -22,9 +22,9 @@ import Behavior.Internal.Signal.Source
 -- >>> import Behavior
 -- >>> import qualified Behavior.Signal as Signal
 
--- | A change counts only once it has lasted for so many seconds (zero or more);
+-- | A change counts only once it has lasted for the given number of seconds (zero or more);
 -- until then the signal keeps its value. Its first value counts at once, and so
--- does the first after a time when nobody watched (as during a recovery).
+-- does the first one after a time when it was not watched (as during a recovery).
 --
 -- >>> Signal.waitUntil (Signal.debounce 0.5 (pure True))
 --
@@ -60,19 +60,19 @@ debounce seconds signal = Signal $ \demand -> do
             ++ [ Worker "debounce" (reset >> const . trackChanges . ignoreErrors <$> view source)
                , Worker "debounce clock" (pure (const promoteAfterDelay))
                ]
-      , -- The look at the source itself is for what it throws.
+      , -- The source is read here too, so that what it throws is thrown.
         view = mapView (*> (readTVar settled >>= maybe retry pure)) <$> view source
       }
 
 -- | A Schmitt trigger: @hysteresis initial low high signal@ becomes true when the signal
 -- reaches @high@, and false when it falls to @low@; in between it keeps its value, which
--- before that is @initial@.
+-- is @initial@ at first.
 --
 -- The memory lasts for the operator's whole run, across recoveries, but no longer: the next
 -- operator begins with @initial@. 'Behavior.Signal.withShared' around several operators makes
 -- it outlive each of them.
 --
--- @low@ must not be above @high@, and neither may be a NaN (an 'ErrorCall' says so).
+-- @low@ must not be above @high@, and neither may be NaN (otherwise an 'ErrorCall' is thrown).
 --
 -- >>> let level = pure 50 :: Signal Int
 -- >>> let charged = Signal.hysteresis True 20 80 level
@@ -92,9 +92,9 @@ hysteresis initial low high signal = Signal $ \demand -> do
         let after = v >= high || (before && v > low)
         when (after /= before) (writeTVar memory after)
         pure after
-      -- What a look finds out is remembered if the operator acts on it, in the same
-      -- transaction, and is undone if the operator goes on waiting. Then this
-      -- remembers it.
+      -- A new state that a read computes is kept if the operator acts on it, in the same
+      -- transaction, and is undone if the operator goes on waiting. In that case this
+      -- thread writes it.
       remember value = forever . atomically $ do
         before <- readTVar memory
         after <- state value
@@ -105,7 +105,7 @@ hysteresis initial low high signal = Signal $ \demand -> do
       , view = mapView state <$> view source
       }
 
--- | A look for those who wait for values only: what it throws is for the operator,
--- which looks for itself.
+-- | The first read, for workers, which only wait for values. What it throws is left to the
+-- operator, which reads the value itself.
 ignoreErrors :: View a -> STM a
 ignoreErrors v = firstRead v `catchSTM` \(_ :: SomeException) -> retry

@@ -2,7 +2,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Sensors that must be asked.
+-- Polled sensors.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Signal.Polling
@@ -24,22 +24,22 @@ import Behavior.Internal.Signal.Source
 -- >>> import Behavior
 -- >>> import qualified Behavior.Signal as Signal
 
--- | A sensor that must be asked: @polling seconds act@ reads it by @act@, in a
--- thread of its own, one reading at a time.
+-- | A sensor that must be polled: @polling seconds act@ reads it by @act@, in its own
+-- thread, one reading at a time.
 --
 -- Readings start in slots that are a period apart, counted from start to start; each slot
--- has at most one. A reading that overruns its slot skips those that it missed.
--- What an operator decides on is always a reading that began after it asked; so after a
--- branch was stopped it waits for the next slot.
+-- has at most one. A reading that overruns its slot skips the slots that it missed.
+-- An operator always decides on a reading that began after the operator did; after it has
+-- stopped a branch, on one that began after that, so it waits for the next slot.
 --
--- The first reading is made at once. Then sensors of the same period are read together:
--- the second reading may come up to a tenth of a period late, and those after it are
--- exact, an hour later to a millisecond. One that is late for its slot, because the
--- machine is busy, does not put off the others.
+-- The first reading is made at once. From then on, sensors of the same period are read
+-- together: the second reading may come up to a tenth of a period late, and those after it
+-- are exact (to a millisecond, even after an hour). A reading that is late for its slot,
+-- because the machine is busy, does not delay later slots.
 --
--- A reading that fails or faults is no value: the operator throws the same. The
--- period must be at least a microsecond (an 'Control.Exception.ErrorCall' says so); an
--- infinite one is for a sensor that is read once.
+-- A reading that fails or faults gives no value: the operator throws the same exception. The
+-- period must be at least a microsecond (otherwise an 'Control.Exception.ErrorCall' is
+-- thrown); with an infinite period the sensor is read once.
 --
 -- >>> Signal.waitUntil (Signal.polling 5e-324 (pure True))
 -- *** Exception: polling: a period is at least 0.000001 seconds, not 5.0e-324
@@ -53,10 +53,10 @@ import Behavior.Internal.Signal.Source
 polling :: Seconds -> Behavior a -> Signal a
 polling every act = Signal $ \demand -> do
   _ <- period "polling" every
-  views <- newTVarIO (0 :: Int) -- how many were asked for: a reading's generation is how many it came after
-  newest <- newTVarIO Nothing -- the reading last published, and its generation
+  views <- newTVarIO (0 :: Int) -- how many views were taken, which gives a reading its generation
+  newest <- newTVarIO Nothing -- the reading published last, and its generation
   next <- newIORef (-1 / 0) -- when the next reading may begin
-  inFlight <- newTVarIO Nothing -- the slot of the reading that is in flight
+  inFlight <- newTVarIO Nothing -- the slot of the reading in flight
   let readings stopRequested = do
         t <- now
         slot <- max t <$> readIORef next
@@ -72,13 +72,13 @@ polling every act = Signal $ \demand -> do
             -- The stop request, if there is one, stays pending until what went wrong has
             -- been thrown.
             stopWanted <- stopRequested
-            -- The reading is not wanted any more, and may have swallowed the stop request.
+            -- The reading is no longer needed, and may have swallowed the stop request.
             -- A fault of its cleanup is not lost.
             when stopWanted (either throwIO (const (pure ())) read')
             pure (read', stopWanted)
           unless stopWanted $ do
             changed <- case (published, read') of
-              -- (A view that was asked for meanwhile waits for this reading, whatever it is.)
+              -- (A view that was taken meanwhile waits for this reading, whatever its value.)
               (Published generation' old, Right new) | generation == generation' -> differs old new
               _ -> pure True
             when (changed || readingTimes demand) . atomically $ do
@@ -89,7 +89,7 @@ polling every act = Signal $ \demand -> do
               Left _ -> Unpublished
               Right new -> Published generation new
       differs old new = either (const True) not <$> trySynchronous (evaluate (equalFor demand old new))
-      -- The slot, or if that has been missed the next one.
+      -- The slot, or the next one if that slot has been missed.
       slotAfter t slot
         | slot >= t = slot
         | otherwise = slot + every * fromInteger (ceiling ((t - slot) / every))
@@ -106,15 +106,14 @@ polling every act = Signal $ \demand -> do
       , inFlightSince = readTVar inFlight
       }
 
--- | What was last published of a sensor, and its generation.
+-- | The value that was last published for a sensor, and its generation.
 data Published a = Unpublished | Published !Int a
 
 -- | Fails the operator when a polled reading of the signal takes longer than the given
 -- number of seconds (at least a microsecond).
 --
--- The branch is stopped at once. A reading that cannot be interrupted makes the
--- operator wait with its return, not with the stop. A signal that is not polled is
--- never stale.
+-- The branch is stopped at once. A reading that cannot be interrupted delays the operator's
+-- return, but not the stop of the branch. A signal that is not polled is never stale.
 --
 -- >>> let hangs = sleep 3600 >> pure True
 -- >>> Signal.waitUntil (Signal.staleAfter 0.01 (Signal.polling 0.1 hangs))
@@ -125,8 +124,8 @@ staleAfter :: Seconds -> Signal a -> Signal a
 staleAfter limit signal = Signal $ \demand -> do
   _ <- period "staleAfter" limit
   source <- open signal demand {readingTimes = True}
-  -- Odd while a reading is overdue, and higher whenever one has been: so a view
-  -- also fails for one that is over by the time it looks.
+  -- Odd while a reading is overdue; it is incremented when a reading becomes overdue, and when
+  -- it no longer is. So a view also fails for a reading that was overdue but no longer is.
   overdue <- newTVarIO (0 :: Int)
   let watchdog = forever $ do
         since <- atomically (inFlightSince source >>= maybe retry pure)

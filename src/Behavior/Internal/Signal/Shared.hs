@@ -23,13 +23,13 @@ import Behavior.Internal.Signal.Source
 
 -- | Opens the sources of a signal once, for all its occurrences in a behaviour.
 --
--- > withShared s body  ~  body s     but with one thread a sensor, not one an occurrence
+-- > withShared s body  ~  body s     but with one thread per sensor, not one per occurrence
 --
--- The sensors are read for as long as the behaviour runs, and are asked to stop
--- together with it: a cleanup must not wait for them. An operator in there decides on a
+-- The sensors are read for as long as the behaviour runs. Their stop is requested together
+-- with the behaviour's: a cleanup must not wait for them. An operator inside decides on a
 -- reading that began after the operator did, and so waits for the next slot, up to a period.
--- All that the behaviour throws is thrown. Outside it the shared signal is closed: to open
--- it there is a fault, an 'ErrorCall'.
+-- Everything that the behaviour throws is thrown. Outside the behaviour the shared signal is
+-- closed: opening it there is a fault, an 'ErrorCall'.
 --
 -- >>> import Data.IORef
 -- >>> count <- newIORef (0 :: Int)
@@ -40,11 +40,11 @@ import Behavior.Internal.Signal.Source
 -- @since 0.1.0.0
 withShared :: Signal a -> (Signal a -> Behavior b) -> Behavior b
 withShared signal body = do
-  -- (A consumer that looks at the times of readings may come later.)
+  -- (A consumer that reads the times of readings may come later.)
   source <- open signal everyValue {readingTimes = True}
   closed <- newTVarIO False
-  -- It closes only when all have ended: some of those that are still stopping may be looking
-  -- just then.
+  -- It is closed only when everything has ended: a thread that is still stopping may be reading
+  -- it.
   structured (sharing source closed) `finally` atomically (writeTVar closed True)
  where
   sharing source closed scope = do

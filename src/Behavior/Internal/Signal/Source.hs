@@ -2,7 +2,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What a signal is made of.
+-- Signals, and the sources that they open.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Signal.Source
@@ -25,7 +25,7 @@ module Behavior.Internal.Signal.Source
   , constantView
   , mapView
 
-    -- * What must run for them
+    -- * The threads of a source
   , Worker (..)
   , Sensors
   , startSensors
@@ -49,13 +49,13 @@ import Behavior.Internal.Scope
 -- (Functional reactive programming calls this a /behaviour/. Here a behaviour is
 -- what the robot does.)
 --
--- A signal is a recipe: each occurrence opens its sources anew, so that
--- @(==) \<$\> s \<*\> s@ on a polled signal @s@ asks the sensor by two threads and
--- can be false; 'withShared' opens them once for all. A signal of several sources
--- is made of the latest value of each, not of one moment. It has a value when
--- each of them has.
+-- A signal only describes its sources: each occurrence opens them separately. So
+-- @(==) \<$\> s \<*\> s@ on a polled signal @s@ reads the sensor in two threads and
+-- can be false; 'withShared' opens the sources once for all occurrences. The value of a
+-- signal with several sources consists of the latest value of each, which may be from
+-- different moments. The signal has a value when each source has one.
 --
--- A change that comes and goes between two looks is not seen.
+-- A change that is undone before the next reading has no effect.
 --
 -- @since 0.1.0.0
 newtype Signal a = Signal {open :: Demand a -> IO (Source a)}
@@ -71,32 +71,32 @@ instance Applicative Signal where
 -- | What a consumer needs of a source.
 data Demand a = Demand
   { equalFor :: a -> a -> Bool
-  -- ^ Which values it need not tell apart: a reading that is the same as the one before may
-  -- be suppressed.
+  -- ^ Which values are equal for it: a reading that is equal to the one before may be
+  -- suppressed.
   , readingTimes :: Bool
-  -- ^ Whether it looks at 'inFlightSince'.
+  -- ^ Whether it reads 'inFlightSince'.
   }
 
--- | To be given every value, and nothing else.
+-- | Demands every value, and no times.
 everyValue :: Demand a
 everyValue = Demand {equalFor = \_ _ -> False, readingTimes = False}
 
--- | The demand that a consumer of the function's results has on its arguments.
+-- | The demand on a function's arguments, given the demand on its results.
 contramapDemand :: Demand b -> (a -> b) -> Demand a
 contramapDemand demand f = demand {equalFor = \a b -> equalFor demand (f a) (f b)}
 
--- | The signal with equal consecutive values suppressed, where that saves something.
+-- | The signal with equal consecutive values suppressed, where suppression saves work.
 suppressEqual :: Eq a => Signal a -> Signal a
 suppressEqual signal = Signal $ \demand -> open signal demand {equalFor = (==)}
 
--- | A signal that was opened, for one run of an operator.
+-- | An opened signal, for one run of an operator.
 data Source a = Source
   { workers :: [Worker]
-  -- ^ What must run while the source is looked at.
+  -- ^ The threads that must run while the source is read.
   , view :: STM (View a)
-  -- ^ A view of the values that are read from this moment on.
+  -- ^ A view of the values that are obtained from this moment on.
   , inFlightSince :: STM (Maybe Seconds)
-  -- ^ When the oldest reading began that is in flight, if that was demanded.
+  -- ^ When the oldest reading in flight began, if that was demanded.
   }
 
 -- | The source that gives this view, and needs no worker.
@@ -119,12 +119,12 @@ instance Applicative Source where
     earliest s Nothing = s
     earliest Nothing t = t
 
--- | How to look at a value. To look throws when there is none any more.
+-- | How to read a value. Reading throws when the value has been lost.
 data View a = View
   { firstRead :: !(STM a)
-  -- ^ For the first time: waits for a value, however long that takes to come.
+  -- ^ The first read: retries until there is a value, however long that takes.
   , reread :: !(STM a)
-  -- ^ After that: a value that is not there has been lost.
+  -- ^ A later read: a value that is missing has been lost.
   }
 
 instance Functor View where
@@ -137,34 +137,34 @@ instance Applicative View where
 -- | Whether the operator has had a value before.
 data ReadMode = FirstRead | Reread
 
--- | The value, looked at in that way.
+-- | Reads the value, as a first or a later read.
 readView :: ReadMode -> View a -> STM a
 readView FirstRead = firstRead
 readView Reread = reread
 
--- | To look the same way each time.
+-- | The view whose first and later reads are the same.
 constantView :: STM a -> View a
 constantView value = View value value
 
--- | The view, looked at in another way.
+-- | Applies the function to both ways of reading.
 mapView :: (STM a -> STM b) -> View a -> View b
 mapView f (View a a') = View (f a) (f a')
 {-# INLINE mapView #-}
 
--- | A thread that a source needs while it is looked at. It runs until its stop is requested,
--- and can see whether it was. It may be started again after a pause.
+-- | A thread that a source needs while it is read. It runs until its stop is requested, and can
+-- read whether it was. It may be started again after a pause.
 data Worker = Worker
   { workerName :: String
   , prepare :: STM (IO Bool -> IO ())
-  -- ^ Prepares one start, and gives what is then to run.
+  -- ^ Prepares one start, and gives the action that the thread runs.
   }
 
--- | The value that a transaction gives: event-driven. It reacts to the very
--- transaction that changes the value, and costs nothing while nothing changes.
+-- | The value that a transaction returns. The signal is event-driven: the operator reacts to
+-- the transaction that changes the value, and nothing is done while nothing changes.
 --
--- While the transaction retries at first, the operator waits for a value (limit that by
--- 'Behavior.Time.timeout', if it may never come). If it retries later the signal has no
--- value any more, and the operator fails. What the transaction throws, the operator throws.
+-- If the transaction retries at first, the operator waits for a value (if there may never
+-- be one, limit that by 'Behavior.Time.timeout'). If it retries later, the signal no longer has
+-- a value, and the operator fails. What the transaction throws, the operator throws.
 --
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar)
 -- >>> battery <- newTVarIO (5 :: Int)
@@ -179,9 +179,9 @@ watching transaction = Signal . const . pure . fromView . pure $ View transactio
 -- | The threads that run for a source, from left to right.
 type Sensors = [Branch ()]
 
--- | Starts what must run while the source is looked at, and gives a view of it. The
--- view comes first, and so do those of the workers: otherwise they could just miss the
--- first reading, and wait for a second one.
+-- | Starts the workers of a source, and gives a view of it. The view is taken before the workers
+-- start, and so are the views that the workers use: otherwise they could miss the first
+-- reading, and have to wait for a second one.
 startSensors :: Scope -> String -> Source a -> IO (View a, Sensors)
 startSensors scope operator source = case workers source of
   [] -> (\seen -> (seen, [])) <$> atomically (view source)
@@ -190,8 +190,8 @@ startSensors scope operator source = case workers source of
     running <- for (zip needed runs) $ \(w, run) -> worker scope (Label operator (workerName w)) run
     (seen, running) <$ yieldReal
 
--- | What one of them has died of, if it has, the leftmost first. (One whose stop was
--- requested has not.)
+-- | What a sensor has failed or faulted with, if one has (the leftmost first). A sensor that
+-- stopped because its stop was requested does not count.
 sensorError :: Sensors -> STM (Maybe SomeException)
 sensorError = foldr orDied (pure Nothing)
  where

@@ -89,7 +89,7 @@ usualOtherwise = \case
 --      0.000 s  1 parallel: left   starts
 --      0.000 s  2 parallel: right  starts
 --      1.000 s  1 parallel: left   ends
---      1.000 s  2 parallel: right  is interrupted: Stop: the operator that started this behaviour no longer wants it
+--      1.000 s  2 parallel: right  is interrupted: Stop: requested by the operator that started this behaviour
 --      1.000 s  2 parallel: right  ends
 --
 -- Of a branch within a branch, the number of the outer one is added. So the branches of two
@@ -138,7 +138,7 @@ ofThreads numbers = filter ((`elem` numbers) . number)
 -- >>> putStr (renderSteps (mentioning ["left", "interrupted"] (steps run)))
 --      0.000 s  1 parallel: left   starts
 --      1.000 s  1 parallel: left   ends
---      1.000 s  2 parallel: right  is interrupted: Stop: the operator that started this behaviour no longer wants it
+--      1.000 s  2 parallel: right  is interrupted: Stop: requested by the operator that started this behaviour
 --
 -- @since 0.1.0.0
 mentioning :: [String] -> [Step] -> [Step]

@@ -152,7 +152,7 @@ waitingTasks sim these = do
  where
   sent target = do
     all' <- readIORef (pending target)
-    pure [Waiting (Label "interrupt" "messenger") (toReceive target) | p <- all', isNothing (sender p)]
+    pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- all', isNothing (sender p)]
   toReceive target = show (taskLabel target) ++ ", to hear an exception"
   reason alive task = \case
     Before _ (Transaction _ _) -> case [show (taskLabel t) | t <- alive, parent t == taskNumber task, isJust (taskThread t)] of
