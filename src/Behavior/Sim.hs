@@ -68,7 +68,7 @@
 --
 -- A loop that never allocates can be stopped by nobody: the process hangs, as it would without
 -- a simulation. (With a second capability, @+RTS -N2@, a line on @stderr@ names the thread,
--- five seconds after 'patience' has run out.) Compile it with @-fno-omit-yields@, and the run
+-- five seconds after 'realTimeLimit' has run out.) Compile it with @-fno-omit-yields@, and the run
 -- ends with 'TooSlow'.
 --
 -- (Schedules are fastest with one capability and large enough stacks: @+RTS -N1 -ki2k@.)

@@ -160,7 +160,7 @@ toBehavior emit stage = go
       checkpoint
       n <- atomicModifyIORef' (calls stage) $ \counts ->
         let n = Map.findWithDefault 0 name counts in (Map.insert name (n + 1) counts, n)
-      act (\deed -> emit (Action name deed)) name (scripts !! min n (length scripts - 1))
+      act (emit . Action name) name (scripts !! min n (length scripts - 1))
     Pure value -> pure value
     Then first second -> go first >> go second
     Else first second -> go first ? go second

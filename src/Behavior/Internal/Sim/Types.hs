@@ -86,7 +86,7 @@ data Run a = Run
   , steps :: [Step]
   -- ^ What happened, from the beginning.
   , schedule :: Schedule
-  -- ^ Replays this very run: a 'Switching'.
+  -- ^ Replays this very run: a 'Preempting'.
   , points :: Int
   -- ^ How many scheduling points it had.
   , leakedThreads :: [Label]
@@ -115,7 +115,7 @@ data Outcome a
     BlockedOutside Label Blocked
   | -- | Something that is not part of the simulation changed what these threads waited for.
     ExternalWakeup [Waiting]
-  | -- | The real time came to 'patience', while this thread ran; the virtual time was this.
+  | -- | The real time came to 'realTimeLimit', while this thread ran; the virtual time was this.
     TooSlow Label Seconds
   | -- | The schedule is not one of this behaviour: why not.
     ScheduleMismatch String
@@ -141,7 +141,7 @@ data Blocked
   | -- | Another thread that was thrown to (@throwTo@, @killThread@, @cancel@), and what the
     -- others waited for meanwhile.
     InThrowing [Waiting]
-  | -- | A value that another thread was computing, up to 'patience'.
+  | -- | A value that another thread was computing, up to 'realTimeLimit'.
     InThunk
   | -- | Anything else.
     Elsewhere

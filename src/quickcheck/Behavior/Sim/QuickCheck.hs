@@ -147,7 +147,7 @@ explained shown rose = do
 falsified :: Result -> Bool
 falsified result = ok result == Just False && expect result
 
--- | Ends a run of the property within 'exploring', which takes it for a counterexample.
+-- | Ends a run of the property within 'tryExplore', which takes it for a counterexample.
 data Falsified = Falsified
   deriving (Show)
 
