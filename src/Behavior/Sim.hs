@@ -1,9 +1,9 @@
 -- |
--- Simulation: what your robot does at the one bad moment, tried out.
+-- Simulation: tests of a behaviour in virtual time, under many schedules.
 --
--- 'simulate' runs a behaviour in virtual time: an hour's sleep takes no time at all, and
--- the same schedule gives the same run, to the step. 'explore' runs it under many
--- schedules, and when one fails, shrinks it and tells what happened:
+-- 'simulate' runs a behaviour in virtual time: an hour's sleep takes no real time, and the
+-- same schedule gives the same steps. 'explore' runs it under many schedules; when the test
+-- fails under one of them, 'explore' shrinks that schedule and shows its steps:
 --
 -- >>> import Behavior
 -- >>> import Behavior.Time (atomically, now)
@@ -23,7 +23,7 @@
 -- :}
 -- *** Exception: schedule 18 fails:
 --   user error (two boxes were picked up, and it counted 1)
--- shrunk to one switch, this happens:
+-- shrunk to one pre-emption, this happens:
 --      0.000 s  0 main         transaction
 --      0.000 s  1 both: left   starts
 --      0.000 s  1 both: left   transaction
@@ -35,41 +35,42 @@
 --      0.000 s  0 main         transaction
 -- to see it again: explore (replaying (Preempting [(5,2)]))
 --
--- The same behaviours are simulated that run on the robot: plain 'IO', whose waiting goes
--- through this library. "Behavior.Sim.Mock" has actions, conditions and sensors to take
--- the hardware's place; the tutorial is @docs\/testing-a-robot.md@.
+-- The simulated behaviour is the one that runs on the robot: plain 'IO' that blocks only in
+-- operations of this library. "Behavior.Sim.Mock" has actions, conditions and sensors that
+-- replace the hardware; the tutorial is @docs\/testing-a-robot.md@.
 --
 -- = How it works
 --
--- One thread runs at a time. Before each operation of this library (to start or to stop a
--- thread, 'Behavior.Time.atomically', 'Behavior.sleep', 'Behavior.Time.now',
--- 'Behavior.Time.checkpoint', and the end of a thread) another may run. The virtual time moves
--- on when no thread can.
+-- One thread runs at a time. There is a /scheduling point/ before each operation of this
+-- library (to start or to stop a thread, 'Behavior.Time.atomically', 'Behavior.sleep',
+-- 'Behavior.Time.now', 'Behavior.Time.checkpoint') and before the end of a thread: there
+-- another thread may run. The virtual time advances when no thread is enabled.
 --
--- A cancellation arrives where GHC raises it: unmasked at these operations and before the
--- end of a thread; masked only where the operation has to wait, or else at the very moment
--- when the thread unmasks, also if no operation follows. ('Control.Exception.throwTo' is not
--- simulated, but what this library's operators throw is.)
+-- A cancellation is received where GHC raises it. An unmasked thread receives it at these
+-- operations and before its end. A masked thread receives it only where the operation has to
+-- wait, or else as soon as the thread unmasks, even if no operation follows.
+-- ('Control.Exception.throwTo' is not simulated, but the exceptions that this library's
+-- operators throw are.)
 --
 -- = What is not simulated
 --
--- Every simulated run is possible on real threads, but not the other way round:
+-- Every simulated run is possible on real threads. Not every real run can be simulated:
 --
--- * What happens between two operations is done in one go: nothing comes in between, and no
---   cancellation arrives there. Put a 'Behavior.Time.checkpoint' where in between it
---   matters: before and after a call to hardware, say.
+-- * The code between two operations is one step: no other thread runs in between, and no
+--   cancellation is received there. Put a 'Behavior.Time.checkpoint' where that matters, for
+--   example before and after a call to hardware.
 -- * Waiting by other means ('Control.Concurrent.threadDelay', an @MVar@, threads of
---   @forkIO@ or @async@) is not simulated. A run that waits so is ended, and 'explain' says what to use
---   instead. (If it waits for less than half a second, that goes
---   unnoticed. So does 'System.Timeout.timeout' around something that is simulated: it counts
---   real time.) To print is fine, as long as somebody reads.
--- * Computing takes no time, and timers are exact, unless 'slip' says otherwise.
--- * Clocks, random numbers and finalizers of your own are as they are.
+--   @forkIO@ or @async@) is not simulated. A run that waits like this is ended, and 'explain'
+--   names what to use instead. (A wait of less than half a second is not detected. Neither is
+--   'System.Timeout.timeout' around a simulated operation: it counts real time.) Printing is
+--   fine, as long as the output is read.
+-- * Computing takes no virtual time, and timers are exact, unless 'slip' is set.
+-- * Your own clocks, random numbers and finalizers are not simulated.
 --
--- A loop that never allocates can be stopped by nobody: the process hangs, as it would without
--- a simulation. (With a second capability, @+RTS -N2@, a line on @stderr@ names the thread,
--- five seconds after 'realTimeLimit' has run out.) Compile it with @-fno-omit-yields@, and the run
--- ends with 'TooSlow'.
+-- A loop that never allocates cannot be stopped: the process hangs, as it would without a
+-- simulation. (With a second capability, @+RTS -N2@, a line on @stderr@ names the thread, five
+-- seconds after 'realTimeLimit' has run out.) Compile the loop with @-fno-omit-yields@, and
+-- the run ends with 'TooSlow'.
 --
 -- (Schedules are fastest with one capability and large enough stacks: @+RTS -N1 -ki2k@.)
 module Behavior.Sim
@@ -80,7 +81,7 @@ module Behavior.Sim
   , defaults
   , Schedule (..)
 
-    -- * What came of it
+    -- * The result of a run
   , Run (..)
   , Outcome (..)
   , explain

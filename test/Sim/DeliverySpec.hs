@@ -211,7 +211,7 @@ throwers = do
       target <- mask_ (start (Label "target" "") (uninterruptibleMask_ (atomically STM.retry)))
       sleep 1
       interrupt (threadId target) (Cancel "a") :: IO ()
-    explain (outcome run) `shouldSatisfy` ("main waits for target, to hear an exception" `isInfixOf`)
+    explain (outcome run) `shouldSatisfy` ("main waits for target to receive an exception" `isInfixOf`)
   it "does not outlive the run" $ do
     held <- newIORef ()
     weak <- mkWeakIORef held (pure ())
@@ -220,7 +220,7 @@ throwers = do
       throwToAll (const (Holding held)) [threadId target]
       sleep 1 :: IO ()
       atomically STM.retry :: IO ()
-    explain (outcome run) `shouldSatisfy` ("interrupt: helper waits for target, to hear an exception" `isInfixOf`)
+    explain (outcome run) `shouldSatisfy` ("interrupt: helper waits for target to receive an exception" `isInfixOf`)
     performMajorGC
     (() <$) <$> deRefWeak weak `shouldReturn` Nothing
   it "has thrown nothing if the run ends and the remaining threads are unwound" $ do

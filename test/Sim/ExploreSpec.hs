@@ -112,7 +112,7 @@ counterexample = do
     case found of
       Left c -> do
         show c `shouldContain` "Fault \"counted 1\""
-        show c `shouldContain` "shrunk to one switch"
+        show c `shouldContain` "shrunk to one pre-emption"
         [words line | line <- lines (show c), "saw" `isInfixOf` line]
           `shouldBe` [ ["0.000", "s", "1", "both:", "left", "saw", "0"]
                      , ["0.000", "s", "3", "both:", "left", "(of", "2)", "saw", "0"]
@@ -120,7 +120,7 @@ counterexample = do
       Right _ -> expectationFailure "it should have been found"
   it "shows the property's exception with the plan's showException" $ do
     found <- tryExplore (randomly 1000) {showException = const "not two"} (counting 2)
-    take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one switch, this happens:"]
+    take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one pre-emption, this happens:"]
   it "shows an exception that did not occur again with the plan's showException" $ do
     runs <- newIORef (0 :: Int)
     found <- tryExplore (randomly 1) {showException = maybe "another" (\(Fault text) -> "fault " ++ text) . fromException} $ \run -> do
@@ -132,7 +132,7 @@ counterexample = do
     found <- tryExplore (randomly 1000) {selectSteps = mentioning ["saw"]} (counting 2)
     (drop 2 . lines <$> either (Just . show) (const Nothing) found)
       `shouldBe` Just
-        [ "shrunk to one switch, this happens (2 of 21 steps):"
+        [ "shrunk to one pre-emption, this happens (2 of 21 steps):"
         , "     0.000 s  1 both: left         saw 0"
         , "     0.000 s  3 both: left (of 2)  saw 0"
         , "to see it again: explore (replaying (Preempting [(5,2)]))"
@@ -152,8 +152,8 @@ counterexample = do
                  , "     0.000 s  4 parallel: right (of 1)  starts"
                  , "     0.000 s  5 parallel: left (of 2)   starts"
                  , "     0.000 s  6 parallel: right (of 2)  starts"
-                 , "     1.000 s  1 both: left              asks 4 parallel: right to stop"
-                 , "     3.000 s  2 both: right             asks 6 parallel: right to stop"
+                 , "     1.000 s  1 both: left              requests the stop of 4 parallel: right"
+                 , "     3.000 s  2 both: right             requests the stop of 6 parallel: right"
                  ]
     map parentNumber (take 2 (steps run)) `shouldBe` [-1, 0]
   it "is found from a schedule that fails, by schedules with fewer pre-emptions" $ do

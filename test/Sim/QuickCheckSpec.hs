@@ -30,7 +30,7 @@ searches = do
       pure (finished run === max s t)
   it "does not hold if it fails under one of them" $ do
     result <- quickCheckWithResult thorough counting
-    output result `shouldContain` "shrunk to one switch"
+    output result `shouldContain` "shrunk to one pre-emption"
     output result `shouldContain` "to see it again: explore (replaying (Preempting [("
     output result `shouldContain` "1 /= 2"
   it "may throw instead of being false" $ do

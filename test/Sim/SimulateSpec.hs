@@ -153,12 +153,12 @@ mistakes = do
       `shouldBe` [ "deadlock: every thread waits, and nothing in the simulation will wake one"
                  , "  main waits for its branches: both: left, both: right"
                  , "  both: left waits for a transaction"
-                 , "  both: right waits for the end of time"
+                 , "  both: right waits for the end of its sleep"
                  ]
   it "a livelock" $ do
     run <- simulateWith defaults {livelockLimit = 3000} (parallel (forever checkpoint) (forever checkpoint))
     explain (outcome run)
-      `shouldBe` "livelock: the virtual time stands still while these run on and on: parallel: left, parallel: right"
+      `shouldBe` "livelock: the virtual time does not advance while these threads run: parallel: left, parallel: right"
   it "a livelock of one thread" $ do
     run <- simulateWith defaults {livelockLimit = 3000} (forever checkpoint :: Behavior ())
     explain (outcome run) `shouldContain` "livelock"
@@ -175,7 +175,7 @@ mistakes = do
       me <- myThreadId
       parallel (sleep 1) (sleep 2 `finally` throwTo me (userError "e-stop"))
     let text = explain (outcome run)
-    text `shouldContain` "parallel: right waited outside of the simulation, for another thread to hear an exception"
+    text `shouldContain` "parallel: right waited outside of the simulation, for another thread to receive an exception"
     text `shouldContain` "\n  main waits for its branches: parallel: right"
   it "a thread that is woken from outside" $ do
     -- The transaction succeeds in its fifth run, when nothing in the simulation can change its

@@ -2,11 +2,11 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Which tasks can use the turn.
+-- Which tasks are enabled.
 --
--- Every task that has not ended, but for the one that has the turn, is in at most one of
--- three places: 'ready', 'awaiting', 'sleepers'. It is in none of them while it waits for
--- what it has thrown to be raised. So a choice does not have to look at all tasks.
+-- Every task that has not ended, except the one that has the turn, is in at most one of three
+-- maps: 'ready', 'awaiting', 'sleepers'. It is in none of them while it waits until an exception
+-- that it threw is raised. So a choice does not have to check all tasks.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Enabled
@@ -31,7 +31,7 @@ import Data.Maybe (isJust)
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Sim.State
 
--- | Puts a task where it belongs, when its place or what was thrown to it has changed.
+-- | Puts a task into the right map, after a change of its position or of its exceptions.
 file :: Sim -> Task -> IO ()
 file sim task = do
   unfile sim task
@@ -51,7 +51,7 @@ file sim task = do
       AlwaysEnabled -> intoReady
  where
   intoReady = modifyIORef' (ready sim) (Map.insert (taskNumber task) task)
-  -- Whatever becomes of its operation, it can run: if it has to wait, it receives.
+  -- Then the task is enabled in any case: if its operation has to wait, it receives the exception.
   canRaise place' = do
     arrived <- isJust <$> readIORef (pendingException task)
     waiting <- not . null <$> readIORef (pending task)
@@ -59,7 +59,7 @@ file sim task = do
       Before MaskedInterruptible _ -> waiting
       _ -> False
 
--- | Takes a task out: it has the turn, or has ended.
+-- | Removes a task from the maps, when it gets the turn or is put into another map.
 unfile :: Sim -> Task -> IO ()
 unfile sim task = do
   modifyIORef' (ready sim) (Map.delete (taskNumber task))
@@ -68,7 +68,7 @@ unfile sim task = do
     Before _ (Moment t) -> modifyIORef' (sleepers sim) (Map.delete (t, taskNumber task))
     _ -> pure ()
 
--- | Those that could use the turn.
+-- | The enabled tasks.
 enabled :: Sim -> IO (Map Int Task)
 enabled sim = do
   certain <- readIORef (ready sim)
@@ -97,17 +97,18 @@ possible sim = \case
         is <- wouldRun
         is <$ writeIORef look (EnabledCache n is (waited || not is))
 
--- | What becomes of an exception that is thrown to a task now.
+-- | When a task receives an exception that is thrown to it now.
 data Receives
   = AtOnce
   | Later
-  | -- | It has ended.
+  | -- | The task has ended.
     Never
 
--- | GHC's own rule: an exception is received unmasked, or masked at an operation that has,
--- or had, to wait. One that has arrived comes first: its handler, to which the next is thrown, is
--- masked. A thread is masked until it has begun. (One with something pending has not begun
--- to wait, or it would have received that.)
+-- | GHC's rule: a task receives an exception at once if it is unmasked, or if it is masked
+-- interruptibly at an operation that has, or had, to wait. An exception that the task is already
+-- to raise comes first: its handler runs masked, and the next exception waits for it. A task is
+-- masked until it has begun. (A task with a pending exception has not begun to wait: it would have
+-- received the exception there.)
 receives :: Sim -> Task -> IO Receives
 receives sim target = do
   arrived <- isJust <$> readIORef (pendingException target)
@@ -121,15 +122,16 @@ receives sim target = do
       pure (if is && not waited then Later else AtOnce)
     _ -> pure Later
 
--- | Whether it is a transaction that had to wait. One that was woken by another capability
--- counts as blocked until it runs again, and receives what is thrown to it meanwhile. (What
--- waits at an 'Control.Concurrent.MVar', as a sleeper does, does not.)
+-- | Whether the operation is a transaction that had to wait. A thread whose transaction is woken
+-- by another capability counts as blocked until it runs again, and receives an exception that is
+-- thrown meanwhile. (A thread that waits at an 'Control.Concurrent.MVar', as a sleeper does, does
+-- not receive it.)
 hasWaited :: Operation -> IO Bool
 hasWaited = \case
   Transaction _ look -> (\(EnabledCache _ _ waited) -> waited) <$> readIORef look
   _ -> pure False
 
--- | The time has come to this moment: the sleepers that are due can run.
+-- | The virtual time has advanced to this moment: makes the sleepers that are due ready.
 wakeUntil :: Sim -> Seconds -> IO ()
 wakeUntil sim t = do
   (due, others) <- Map.spanAntitone ((<= t) . fst) <$> readIORef (sleepers sim)

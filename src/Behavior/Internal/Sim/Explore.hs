@@ -29,7 +29,7 @@ import Behavior.Internal.Sim.Types
 -- >>> import Behavior
 -- >>> import Behavior.Sim
 
--- | What the property threw once, but not when the same schedule was run again.
+-- | An exception that the property threw once, but not when the same schedule was run again.
 newtype Unrepeatable = Unrepeatable String
 
 instance Show Unrepeatable where
@@ -40,25 +40,26 @@ instance Show Unrepeatable where
 
 instance Exception Unrepeatable
 
--- | One run of the property: what it threw, and the run that it made.
+-- | One run of the property: its exception, and the simulated run.
 data Trial = Trial
   { thrown :: Maybe SomeException
-  , switches :: [(Int, Int)]
+  , deviations :: [(Int, Int)]
+  -- ^ The choices that deviate from the non-preemptive schedule.
   , happened :: [Step]
   , size :: Int
   }
 
 -- | Runs a property under many schedules, until one fails.
 --
--- The property is given a function that simulates (as 'simulateWith' does, under the
--- schedule that is to be tried). It makes what it needs, simulates once, and throws if
--- something is wrong, as the expectations of test libraries do.
+-- The property is given a function that simulates a behaviour, as 'simulateWith' does, under
+-- the schedule that is tried. The property creates the state that it needs, simulates once, and
+-- throws if something is wrong, as the expectations of test libraries do.
 --
--- [Result] What was explored, if the property held under every schedule.
--- [Failure] If it did not: a 'Counterexample', whose schedule was shrunk to few
---   pre-emptions. Shrunk or not, it is replayed by 'replaying'.
--- [Fault] A run that is none ('Outside', 'Meddled', 'TooSlow', 'Misfit') is thrown to
---   the property, in words.
+-- [Result] A 'Report', if the property held under every schedule.
+-- [Failure] Otherwise a 'Counterexample' is thrown, whose schedule was shrunk to few
+--   pre-emptions. 'replaying' runs it again.
+-- [Fault] If a run is not a valid simulation ('BlockedOutside', 'ExternalWakeup', 'TooSlow',
+--   'ScheduleMismatch'), an 'ErrorCall' with the text of 'explain' is thrown to the property.
 --
 -- >>> :{
 -- report <- explore (exhaustively 1) $ \simulate -> do
@@ -76,7 +77,7 @@ explore plan property =
     Left counterexample -> throwIO counterexample
     Right report -> pure report
 
--- | 'explore' that gives the counterexample.
+-- | 'explore' that returns the counterexample.
 --
 -- >>> found <- tryExplore (exhaustively 1) (\simulate -> simulate (sleep 1) >>= \run -> if finished run > 0 then fail "late" else pure ())
 -- >>> either failing (error . show) found
@@ -111,8 +112,8 @@ tryExplore plan property = case search plan of
             Nothing -> go (i + 1) (total + size t)
             Just e -> Left <$> reduced i e t
 
-  -- The queue is a stack: what it holds are the alternatives to the decisions of the
-  -- schedule that was tried last, and of those that this one continues.
+  -- The queue is a stack. It holds the alternatives to the decisions of the last schedule,
+  -- and to those of the prefixes that this schedule continues.
   fullSearch k limit = go 1 0 (emptyPrefix k) []
    where
     go :: Int -> Int -> Prefix -> [Alternatives] -> IO (Either Counterexample Report)
@@ -125,7 +126,7 @@ tryExplore plan property = case search plan of
             (Nothing, Just (next, rest)) -> go (n + 1) (total + size t) next rest
             (Nothing, Nothing) -> pure (Right (Report n True (total + size t)))
 
-  -- Runs the undisturbed schedule but for the choices of the prefix; and puts the
+  -- Runs the non-preemptive schedule except for the choices of the prefix, and puts the
   -- alternatives to the decisions after them in front of the queue.
   branching prefix others = do
     queue <- newIORef others
@@ -133,15 +134,16 @@ tryExplore plan property = case search plan of
     (,) t <$> readIORef queue
 
   reduced i e t = do
-    (fewer, e') <- shrunk (switches t) e
+    (fewer, e') <- shrunk (deviations t) e
     (fewest, e'') <- simplest fewer e'
     again <- tryRun o {detailed = True} (preempting True fewest) property
     let why = fromMaybe (toException (Unrepeatable (showException plan e''))) (thrown again)
     pure Counterexample {failing = Preempting fewest, reason = why, failingSteps = happened again, schedulesTried = i, foundBy = plan}
 
-  -- To leave out one switch moves what comes after it, so that the others may miss their
-  -- points. So it looks afresh, the schedules with the fewest switches first. What is
-  -- queued and can never be tried is left out: it could be much.
+  -- Leaving out one pre-emption changes the numbers of the later points, so the remaining
+  -- pre-emptions may no longer fit. So this searches from the beginning, the schedules with the
+  -- fewest choices first. It drops the part of the queue that the budget cannot reach: it could
+  -- be large.
   simplest :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
   simplest known why = go (2000 :: Int) (emptyPrefix 2) [] Seq.empty
    where
@@ -158,7 +160,7 @@ tryExplore plan property = case search plan of
         | null later -> pure (known, why)
         | otherwise -> continue budget (toList later) Seq.empty
 
-  -- Leaves out halves, quarters... of the switches, as long as it still fails.
+  -- Leaves out halves, quarters... of the pre-emptions, as long as the property still fails.
   shrunk :: [(Int, Int)] -> SomeException -> IO ([(Int, Int)], SomeException)
   shrunk start = go (500 :: Int) (length start) start
    where
@@ -171,7 +173,8 @@ tryExplore plan property = case search plan of
       | otherwise = do
           t <- try' (preempting False candidate)
           case thrown t of
-            Just e' | length (switches t) < length these -> go (budget - 1) (min chunk (length (switches t))) (switches t) e'
+            Just e'
+              | fewer <- deviations t, length fewer < length these -> go (budget - 1) (min chunk (length fewer)) fewer e'
             _ -> attemptAll (budget - 1) chunk more these why
   without n these = [take i these ++ drop (i + n) these | i <- [0, n .. length these - 1]]
 
@@ -186,10 +189,10 @@ tryRun o choosing property = do
           Nothing -> do
             chooser' <- choosing
             run <- simulateBy o chooser' act
-            let switched = case schedule run of
+            let deviating = case schedule run of
                   Preempting s -> s
                   _ -> []
-            writeIORef made (Just (switched, steps run, points run))
+            writeIORef made (Just (deviating, steps run, points run))
             case outcome run of
               BlockedOutside _ _ -> improper run
               ExternalWakeup _ -> improper run

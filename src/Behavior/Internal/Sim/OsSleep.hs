@@ -2,7 +2,7 @@
 {-# LANGUAGE CPP #-}
 
 -- |
--- To sleep while GHC's own threads may be kept from running.
+-- Sleeping in the operating system, which works even if no GHC thread can run.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.OsSleep
@@ -16,9 +16,9 @@ import Control.Concurrent (rtsSupportsBoundThreads, threadDelay)
 import System.Posix.Unistd (usleep)
 #endif
 
--- | Sleeps for the given number of microseconds. With the threaded runtime in the operating system:
--- 'threadDelay' needs a thread of the runtime's own, which may never have its turn while
--- another one keeps its capability busy.
+-- | Sleeps for the given number of microseconds. With the threaded runtime, this is a sleep of the
+-- operating system: 'threadDelay' needs a thread of the runtime, which may never run while another
+-- thread keeps its capability busy.
 osSleep :: Int -> IO ()
 #if defined(mingw32_HOST_OS)
 osSleep = threadDelay

@@ -3,11 +3,12 @@
 -- |
 -- Exceptions that are thrown from one task to another, and raised where GHC raises them.
 --
--- One that its target can receive where it stands is raised by the target itself, when that
--- next has the turn. Any other is put into GHC's own queue: a helper, a real thread, is
--- blocked in a real 'throwTo'. So GHC raises it, at the very unmask, and in GHC's order.
--- The helper is on the same capability, where GHC wakes it as it raises the exception: to
--- look at the helper's state, which no other thread changes meanwhile, is no race.
+-- If the target can receive the exception where it is blocked, the target itself raises it, in
+-- its next turn. Otherwise the exception is put into GHC's own queue: a real thread, the helper
+-- thread, is blocked in a real 'throwTo'. So GHC raises it exactly when the target unmasks, and
+-- in GHC's order. The helper thread is on the same capability, where GHC wakes it as it raises
+-- the exception. No other thread changes the helper thread's state meanwhile, so that reading
+-- its state is no race.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Pending
@@ -32,7 +33,8 @@ import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Text
 import Behavior.Internal.Sim.Types
 
--- | Throws to a task, now. What is pending then, if that cannot receive it where it stands.
+-- | Throws to a task, now. The result: the pending exception, if the task cannot receive it
+-- where it is blocked.
 throwAt :: Sim -> Maybe Task -> Task -> SomeException -> IO (Maybe Pending)
 throwAt sim from target e = do
   how <- receives sim target
@@ -40,7 +42,7 @@ throwAt sim from target e = do
     Never -> pure Nothing
     AtOnce -> do
       writeIORef (pendingException target) (Just e)
-      -- If the target itself waits in a 'throwTo', that has ended by this.
+      -- If the target itself waits in a 'throwTo', this ends that 'throwTo'.
       here <- readIORef (blockedAt target)
       case here of
         Before _ (Delivery further p) -> withdraw sim further p
@@ -65,25 +67,25 @@ isBlocked, isOver :: ThreadStatus -> Bool
 isBlocked = (== ThreadBlocked BlockedOnException)
 isOver status = status `elem` [ThreadFinished, ThreadDied]
 
--- | Takes back what is pending for the target.
+-- | Withdraws an exception that is pending for the target.
 withdraw :: Sim -> Task -> Pending -> IO ()
 withdraw sim target p = do
   done <- readIORef (released p)
   unless done $ do
     uninterruptibleMask_ (release p)
     modifyIORef' (pending target) (filter ((/= throwingThread p) . throwingThread))
-    -- It was ready because of this, if it does not have the turn.
+    -- The target may have been ready only because of this exception.
     was <- Map.member (taskNumber target) <$> readIORef (ready sim)
     when was (file sim target)
 
--- | The target has ended, or the run has.
+-- | Withdraws all exceptions that are pending for the target: the target, or the run, has ended.
 withdrawAll :: Sim -> Task -> IO ()
 withdrawAll sim target = do
   all' <- readIORef (pending target)
   writeIORef (pending target) []
   for_ all' $ \p -> release p >> wakeSender sim p
 
--- | Ends the helper, which has ended when this returns.
+-- | Ends the helper thread, and returns when it has ended.
 release :: Pending -> IO ()
 release p = do
   writeIORef (released p) True
@@ -96,7 +98,7 @@ untilOver p = threadStatus (throwingThread p) >>= \status -> unless (isOver stat
 wakeSender :: Sim -> Pending -> IO ()
 wakeSender sim p = for_ (sender p) (file sim)
 
--- | Notes what was raised in the task that has the turn, since this was done last.
+-- | Records the exceptions that GHC has raised in the running task since the last call.
 settle :: Sim -> IO ()
 settle sim = do
   me <- readIORef (current sim)
@@ -118,6 +120,6 @@ settlePending sim me all' = do
     tested <- traverse (\x -> (,) x <$> test x) list
     pure ([x | (x, True) <- tested], [x | (x, False) <- tested])
 
--- | The task is about to wait, interruptibly: so it receives something that is pending.
+-- | The task is about to wait interruptibly: raises an exception that is pending.
 receive :: IO ()
 receive = unsafeUnmask (pure ())

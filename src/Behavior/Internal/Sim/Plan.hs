@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What to explore, and what comes of it.
+-- Which schedules to explore, and the results.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Plan
@@ -28,7 +28,7 @@ import Behavior.Internal.Sim.Types
 -- >>> import Behavior.Sim
 
 -- | Which schedules to run, and how. Begin with one of 'randomly', 'exhaustively' and
--- 'replaying', and change what should be different:
+-- 'replaying', and change some of its fields:
 --
 -- >>> let plan = (randomly 1000) {search = Random 1000 7, runOptions = defaults {endAt = 60}}
 --
@@ -36,15 +36,15 @@ import Behavior.Internal.Sim.Types
 data Plan = Plan
   { search :: Search
   , runOptions :: Options
-  -- ^ Its 'scheduled' is not looked at.
+  -- ^ The field 'scheduled' is ignored.
   , showException :: SomeException -> String
-  -- ^ How the text of a 'Counterexample' shows what the property threw; by default with
+  -- ^ How the text of a 'Counterexample' shows the property's exception; by default with
   -- 'Control.Exception.displayException'.
   , selectSteps :: [Step] -> [Step]
-  -- ^ Which of its steps that text has; by default all. (See 'ofThreads', 'mentioning'.)
+  -- ^ The steps that this text shows; by default all. (See 'ofThreads', 'mentioning'.)
   }
 
--- | The search under the options, and the defaults.
+-- | A plan with the default text.
 plan :: Search -> Options -> Plan
 plan s o = Plan {search = s, runOptions = o, showException = text, selectSteps = id}
 
@@ -52,20 +52,21 @@ plan s o = Plan {search = s, runOptions = o, showException = text, selectSteps =
 --
 -- @since 0.1.0.0
 data Search
-  = -- | So many random ones, from this seed. Each has few pre-emptions or many.
+  = -- | The given number of random ones, from the given seed. Each has few pre-emptions or many.
     Random Int Int
-  | -- | All with up to so many pre-emptions; but no more schedules than the second number.
+  | -- | All with up to the given number of pre-emptions, but not more schedules than the second
+    -- number.
     Exhaustive Int Int
   | -- | This one.
     Replay Schedule
   | -- | This one; and if the property fails under it, schedules with fewer pre-emptions, to
-    -- find one under which it also fails.
+    -- find one under which it fails too.
     Shrink Schedule
   deriving (Eq, Show)
 
--- | So many random schedules: each has few pre-emptions or many, but mostly few.
+-- | The given number of random schedules. Each has few pre-emptions or many, but mostly few.
 --
--- The seed is 0: another one tries other schedules.
+-- The seed is 0. Another seed tries other schedules.
 --
 -- >>> search (randomly 1000)
 -- Random 1000 0
@@ -74,22 +75,22 @@ data Search
 randomly :: Int -> Plan
 randomly n = plan (Random n 0) defaults
 
--- | All schedules with up to so many pre-emptions, if there are no more than a million:
--- for small behaviours. (To go on with another thread where one has to wait is no
--- pre-emption: such choices are all made.)
+-- | All schedules with up to the given number of pre-emptions, but at most a million schedules:
+-- for small behaviours. (Where the running thread has to wait, the choice of the next thread is
+-- not counted as a pre-emption: every enabled thread is tried there.)
 --
 -- @since 0.1.0.0
 exhaustively :: Int -> Plan
 exhaustively k = plan (Exhaustive k 1000000) defaults
 
--- | Only this schedule, told in detail: what a 'Counterexample' says, to see it again.
+-- | Only this schedule, with detailed steps: to replay a 'Counterexample'.
 --
 -- @since 0.1.0.0
 replaying :: Schedule -> Plan
 replaying s = plan (Replay s) defaults {detailed = True}
 
--- | The same schedules, with an end: every run is stopped when the virtual time comes to
--- this ('endAt'), with 'OutOfTime'. For missions that have no end of their own.
+-- | The same plan with an end: every run is ended with 'OutOfTime' when the virtual time
+-- reaches this ('endAt'). For missions that do not end by themselves.
 --
 -- >>> import Control.Monad (forever)
 -- >>> report <- explore (randomly 100 `endingAt` 60) (\simulate -> () <$ simulate (forever (sleep 1)))
@@ -100,16 +101,16 @@ replaying s = plan (Replay s) defaults {detailed = True}
 endingAt :: Plan -> Seconds -> Plan
 endingAt whole end = whole {runOptions = (runOptions whole) {endAt = end}}
 
--- | What was explored.
+-- | How many schedules were explored.
 --
 -- @since 0.1.0.0
 data Report = Report
   { schedules :: !Int
   -- ^ How many schedules were run.
   , complete :: !Bool
-  -- ^ Whether those were all that the plan asks for.
+  -- ^ Whether those were all schedules of the plan.
   , pointsInAll :: !Int
-  -- ^ How many scheduling points they had.
+  -- ^ How many scheduling points they had, in all.
   }
   deriving (Eq)
 
@@ -120,19 +121,19 @@ instance Show Report where
 
 -- | A schedule under which the property does not hold.
 --
--- Its text says what went wrong, what happened up to then, and how to replay it.
+-- Its text shows the property's exception, the steps of the run, and how to replay it.
 --
 -- @since 0.1.0.0
 data Counterexample = Counterexample
   { failing :: Schedule
   , reason :: SomeException
-  -- ^ What the property threw.
+  -- ^ The exception that the property threw.
   , failingSteps :: [Step]
-  -- ^ What happened, in detail.
+  -- ^ The detailed steps.
   , schedulesTried :: Int
   -- ^ How many schedules were run until one failed.
   , foundBy :: Plan
-  -- ^ How it was found, and how its text shows it.
+  -- ^ The plan that found it, and that determines its text.
   }
 
 instance Show Counterexample where
@@ -148,12 +149,12 @@ instance Show Counterexample where
 
 instance Exception Counterexample
 
--- | The text of a counterexample without what the property threw: the schedule, what
--- happened, and how to replay it.
+-- | The text of a counterexample without the property's exception: the schedule, the steps,
+-- and how to replay it.
 --
 -- >>> found <- tryExplore (exhaustively 1) (\simulate -> simulate (sleep 1) >> fail "always")
 -- >>> either (putStrLn . renderSchedule) print found
--- shrunk to the undisturbed schedule, this happens:
+-- shrunk to the non-preemptive schedule, this happens:
 --      0.000 s  0 main  sleeps until 1.000 s
 -- to see it again: explore (replaying (Preempting []))
 --
@@ -172,7 +173,7 @@ renderSchedule c =
     | length selected == length (failingSteps c) = ""
     | otherwise = " (" ++ show (length selected) ++ " of " ++ show (length (failingSteps c)) ++ " steps)"
   schedule' = case failing c of
-    Preempting [] -> "shrunk to the undisturbed schedule"
-    Preempting [_] -> "shrunk to one switch"
-    Preempting several -> "shrunk to " ++ show (length several) ++ " switches"
+    Preempting [] -> "shrunk to the non-preemptive schedule"
+    Preempting [_] -> "shrunk to one pre-emption"
+    Preempting several -> "shrunk to " ++ show (length several) ++ " pre-emptions"
     other -> "under the schedule " ++ show other

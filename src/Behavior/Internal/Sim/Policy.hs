@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Which thread runs when several could.
+-- Which thread runs when several are enabled.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Policy
@@ -19,39 +19,39 @@ import Data.Word (Word64)
 
 import Behavior.Internal.Sim.Types (Schedule (..))
 
--- | A scheduling point at which several threads could run.
+-- | A scheduling point at which several threads are enabled.
 data Decision = Decision
   { decisionPoint :: !Int
   , usual :: !Int
-  -- ^ Who runs in the undisturbed schedule.
+  -- ^ The thread that runs in the non-preemptive schedule.
   , canGoOn :: !Bool
-  -- ^ Whether that is the thread which ran: any other is a pre-emption.
+  -- ^ Whether that is the thread that ran until now: then any other choice is a pre-emption.
   , candidates :: [Int]
-  -- ^ All that can run.
+  -- ^ All enabled threads.
   , candidateCount :: !Int
   , candidateAt :: Int -> Int
-  -- ^ The same, by their places from 0: of many, to find one takes no time.
+  -- ^ The same, by their index from 0: fast even among many threads.
   }
 
 -- | How decisions are made.
 data Policy = Policy
   { askAt :: IO Int
-  -- ^ The number of the next scheduling point at which to ask, although the thread that
-  -- runs could go on. (Where it cannot, the policy is always asked.)
+  -- ^ The number of the next scheduling point at which the policy decides although the thread
+  -- that runs can go on. (Where it cannot, the policy always decides.)
   , decide :: Decision -> IO (Either String Int)
-  -- ^ One of the candidates; or why the schedule does not fit.
+  -- ^ Chooses one of the candidates; or the reason why the schedule does not fit.
   , unused :: IO [(Int, Int)]
-  -- ^ What is left of the schedule.
+  -- ^ The rest of the schedule.
   }
 
--- | The policy that a schedule stands for.
+-- | The policy that runs a schedule.
 policy :: Schedule -> IO Policy
 policy NonPreemptive = preempting True []
 policy (Preempting exceptions) = preempting True exceptions
 policy (Seeded seed) = random seed
 
--- | The non-preemptive schedule but for some exceptions. Those that do not fit are refused, or (when the
--- schedule is being shrunk) left out.
+-- | The non-preemptive schedule with the given exceptions. An exception that does not fit is
+-- refused, or (while the schedule is shrunk) left out.
 preempting :: Bool -> [(Int, Int)] -> IO Policy
 preempting strictly exceptions = do
   left <- newIORef exceptions
@@ -81,8 +81,8 @@ preempting strictly exceptions = do
             ++ show (candidates d)
     | otherwise = Right (usual d)
 
--- | A random schedule. Each has a rate of pre-emptions of its own, between one in four
--- points and one in five hundred: few pre-emptions find most defects.
+-- | A random schedule. Each has its own rate of pre-emptions, between one in four points and
+-- one in five hundred: few pre-emptions find most defects.
 random :: Int -> IO Policy
 random seed = do
   state <- newIORef (fromIntegral seed * 0x9e3779b97f4a7c15 + 0x1234567)
@@ -111,17 +111,17 @@ random seed = do
  where
   among below d = candidateAt d <$> below (candidateCount d)
 
--- | The exceptions, then the undisturbed schedule; and tells the second action of every
--- decision that there was after the last exception.
+-- | The exceptions, then the non-preemptive schedule. Runs the given action for every decision
+-- after the last exception.
 fully :: [(Int, Int)] -> (Decision -> IO ()) -> IO Policy
-fully exceptions tell = do
+fully exceptions onDecision = do
   inner <- preempting True exceptions
   pure
     inner
       { askAt = pure minBound
       , decide = \d -> do
           left <- unused inner
-          if null left then tell d >> pure (Right (usual d)) else decide inner d
+          if null left then onDecision d >> pure (Right (usual d)) else decide inner d
       }
 
 -- | The mixing function of SplitMix.

@@ -1,12 +1,12 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- How schedules begin that a search has yet to try.
+-- The beginnings of the schedules that a search has yet to try.
 --
--- There are many, and each is found during a run that is over when it is tried. So nothing
--- in the queue is lazy: a thunk would keep the threads of that run. A decision costs about
--- 20 words there, however many threads were enabled, and the decisions of one run share the
--- beginning of its schedule.
+-- There are many. Each is found during one run, and tried after that run has ended. So nothing
+-- in the queue is lazy: a thunk would keep the threads of that run alive. A decision costs about
+-- 20 words in the queue, however many threads were enabled, and the decisions of one run share
+-- the beginning of its schedule.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Prefix
@@ -27,10 +27,11 @@ import qualified Data.IntSet as IntSet
 
 import Behavior.Internal.Sim.Policy (Decision (..))
 
--- | The choices that are not the usual ones, and how many pre-emptions may follow them.
+-- | The choices that deviate from the non-preemptive schedule, and how many pre-emptions may
+-- follow them.
 data Prefix = Prefix !Int !Choices
 
--- | The number of a scheduling point and of the thread that runs there, the latest first.
+-- | The number of a scheduling point, and of the thread that runs there; the latest first.
 data Choices
   = NoChoice
   | Choice !Int !Int !Choices
@@ -51,18 +52,19 @@ choices (Prefix _ latestFirst) = go [] latestFirst
 choiceCount :: Prefix -> Int
 choiceCount = length . choices
 
--- | What else could run at a scheduling point: how many pre-emptions may follow, the number
--- of the point, the threads, and the choices before it.
+-- | The other enabled threads at a scheduling point: how many pre-emptions may follow, the
+-- number of the point, the threads, and the choices before it.
 data Alternatives = Alternatives !Int !Int !IntSet !Choices
 
--- | The unusual choices at this decision, which comes after the prefix, if it may have them.
+-- | The other choices at this decision, which comes after the prefix, if the number of
+-- pre-emptions allows them.
 alternatives :: Prefix -> Decision -> Maybe Alternatives
 alternatives (Prefix preemptions before) d
-  | preemptions < cost || IntSet.null unusual = Nothing
-  | otherwise = Just $! Alternatives (preemptions - cost) (decisionPoint d) unusual before
+  | preemptions < cost || IntSet.null others = Nothing
+  | otherwise = Just $! Alternatives (preemptions - cost) (decisionPoint d) others before
  where
   cost = if canGoOn d then 1 else 0
-  unusual = IntSet.delete (usual d) (IntSet.fromList (candidates d))
+  others = IntSet.delete (usual d) (IntSet.fromList (candidates d))
 
 -- | The next prefix, and the rest of the queue. (The threads of one decision are tried in
 -- the order of their numbers.)

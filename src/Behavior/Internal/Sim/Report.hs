@@ -2,7 +2,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What came of a simulation, in words.
+-- The texts that describe a run: its outcome and its steps.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Report
@@ -28,7 +28,7 @@ import Behavior.Internal.Sim.Types
 -- >>> import Behavior.Time (atomically)
 -- >>> import Control.Concurrent.STM (retry)
 
--- | How a run ended, in words; and if it is a mistake, what to do about it.
+-- | Describes how a run ended. If the cause is a mistake, the text says how to correct it.
 --
 -- >>> run <- simulate (both (sleep 1) (atomically retry))
 -- >>> putStrLn (explain (outcome run))
@@ -44,9 +44,9 @@ explain = \case
   Faulting e -> "it faulted: " ++ text e
   Cancelled e -> "it was cancelled: " ++ text e
   Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
-  Livelock labels -> "livelock: the virtual time stands still while these run on and on: " ++ commas labels
+  Livelock labels -> "livelock: the virtual time does not advance while these threads run: " ++ commas labels
   OutOfTime -> "the virtual time has come to the end that was set"
-  BlockedOutside label' blocked -> show label' ++ " waited outside of the simulation, " ++ usualOtherwise blocked
+  BlockedOutside label' blocked -> show label' ++ " waited outside of the simulation, " ++ waitAndAdvice blocked
   ExternalWakeup waiting ->
     listed
       "something outside of the simulation changed what these waited for (a thread of forkIO or async? \
@@ -60,11 +60,11 @@ explain = \case
 listed :: String -> [Waiting] -> String
 listed title = intercalate "\n  " . (title :) . map (\(Waiting who' what') -> show who' ++ " waits for " ++ what')
 
-usualOtherwise :: Blocked -> String
-usualOtherwise = \case
+waitAndAdvice :: Blocked -> String
+waitAndAdvice = \case
   InMVar ->
     "at an MVar or for the time (takeMVar, threadDelay, System.Timeout.timeout, forkIO and a wait for it, \
-    \output that nobody reads): \
+    \output that is not read): \
     \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
   InTransaction ->
     "in a transaction (Control.Concurrent.STM.atomically, or async's wait, race, concurrently): \
@@ -74,15 +74,15 @@ usualOtherwise = \case
     \or takes longer than realTimeLimit): compute it before, by evaluate"
   InThrowing others ->
     listed
-      "for another thread to hear an exception (throwTo, killThread, cancel): use parallel or fork; \
-      \and a cleanup must not throw to who waits for its end"
+      "for another thread to receive an exception (throwTo, killThread, cancel): use parallel or fork; \
+      \and a cleanup must not throw to the thread that waits for its end"
       others
   Elsewhere ->
-    "for something that this library knows nothing of (threadDelay): \
+    "for something unknown to this library (threadDelay): \
     \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
 
--- | What happened, a line for each step (what repeats itself is told once): the virtual
--- time, the number and the label of the thread, and what it did.
+-- | A line for each step (one line for consecutive equal steps): the virtual time, the number
+-- and the label of the thread, and what it did.
 --
 -- >>> run <- simulate (parallel (sleep 1) (sleep 2))
 -- >>> putStr (renderSteps (steps run))
@@ -92,8 +92,8 @@ usualOtherwise = \case
 --      1.000 s  2 parallel: right  is interrupted: Stop: requested by the operator that started this behaviour
 --      1.000 s  2 parallel: right  ends
 --
--- Of a branch within a branch, the number of the outer one is added. So the branches of two
--- operators can be told apart, whatever their labels are:
+-- For a branch inside another branch, the number of the outer one is added. So the branches of
+-- two operators can be distinguished, whatever their labels are:
 --
 -- >>> run <- simulate (parallel (parallel (sleep 1) (sleep 1)) (parallel (sleep 1) (sleep 1)))
 -- >>> putStr (renderSteps (take 6 (steps run)))
@@ -116,11 +116,11 @@ renderSteps made = unlines (concatMap (map line . take 1) (groupBy repeated made
   padLeft n t = replicate (n - length t) ' ' ++ t
   padRight n t = t ++ replicate (n - length t) ' '
 
--- | Its number, its label, and the branch that it is within.
+-- | The thread's number, its label, and the number of the branch that it is inside.
 thread :: Step -> String
 thread s = show (number s) ++ " " ++ show (label s) ++ (if parentNumber s > 0 then " (of " ++ show (parentNumber s) ++ ")" else "")
 
--- | Only the steps of the threads with these numbers.
+-- | Only the steps of the threads with the given numbers.
 --
 -- >>> run <- simulate (parallel (sleep 1) (sleep 2))
 -- >>> putStr (renderSteps (ofThreads [1] (steps run)))
@@ -131,8 +131,8 @@ thread s = show (number s) ++ " " ++ show (label s) ++ (if parentNumber s > 0 th
 ofThreads :: [Int] -> [Step] -> [Step]
 ofThreads numbers = filter ((`elem` numbers) . number)
 
--- | Only the steps in whose line one of these texts occurs: a part of a thread's label, or
--- of what it did, such as the name of an action or a condition.
+-- | Only the steps whose line contains one of the given texts: for example a part of a thread's
+-- label, or the name of an action or a condition.
 --
 -- >>> run <- simulate (parallel (sleep 1) (sleep 2))
 -- >>> putStr (renderSteps (mentioning ["left", "interrupted"] (steps run)))
@@ -144,14 +144,14 @@ ofThreads numbers = filter ((`elem` numbers) . number)
 mentioning :: [String] -> [Step] -> [Step]
 mentioning texts = filter (\s -> any (`isInfixOf` (thread s ++ "  " ++ aside (did s))) texts)
 
--- | What a thread did, in words.
+-- | The text of what a thread did.
 aside :: StepKind -> String
 aside = \case
   Starts -> "starts"
   Ends -> "ends"
   Note what' -> what'
   ReceivesException e -> "is interrupted: " ++ e
-  Throws n target -> "asks " ++ show n ++ " " ++ show target ++ " to stop"
+  Throws n target -> "requests the stop of " ++ show n ++ " " ++ show target
   Transacts -> "transaction"
   Sleeps (Seconds t)
     | isInfinite t -> "sleeps for ever"
@@ -161,6 +161,6 @@ aside = \case
 commas :: [Label] -> String
 commas = intercalate ", " . map show
 
--- | What an exception says of itself, without GHC's own additions.
+-- | The text of an exception, without GHC's own additions.
 text :: SomeException -> String
 text (SomeException e) = safeShow (displayException e)

@@ -4,12 +4,13 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- The scheduler: what a simulation does when its threads ask the seam for something.
+-- The scheduler: how a simulation does the operations of its tasks.
 --
--- All operations begin in 'operation', where the task that has the turn may hand it on.
+-- All operations begin in 'operation', where the task that has the turn may pass it to another.
 --
--- What is thrown to a task it raises in the place of its operation, if it can receive it
--- there; otherwise GHC does, when it unmasks ("Behavior.Internal.Sim.Pending").
+-- An exception that is thrown to a task is raised in place of the task's operation, if the
+-- task can receive it there; otherwise GHC raises it when the task unmasks
+-- ("Behavior.Internal.Sim.Pending").
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Scheduler
@@ -38,7 +39,7 @@ import Behavior.Internal.Sim.Text
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
 
--- | What the seam calls.
+-- | The backend that the seam calls.
 simulation :: Sim -> Simulator
 simulation sim =
   Simulator
@@ -63,11 +64,11 @@ simulation sim =
     , lookAtClock = readIORef (time sim)
     , record = \event -> settle sim >> case event of
         Started _ -> recordStep sim Starts
-        Ended _ -> pure () -- It ends when that is known: see 'leave'.
+        Ended _ -> pure () -- 'leave' records the end, after the result is published.
         Annotated text -> recordStep sim (Note text)
     }
  where
-  -- One that has ended hears nothing.
+  -- An exception for a thread that has ended is dropped.
   withTarget target act = do
     found <- Map.lookup target <$> readIORef (threads sim)
     for_ found (\there -> recordDetail sim (Throws (taskNumber there) (taskLabel there)))
@@ -75,33 +76,33 @@ simulation sim =
     me <- readIORef (current sim)
     for_ found (act me)
   unlessUnwinding act = readIORef (unwinding sim) >>= \ending -> unless ending act
-  -- The sender can be interrupted meanwhile, and then has thrown nothing.
+  -- A sender that is interrupted while it waits withdraws its exception, as in GHC's 'throwTo'.
   untilRaised there p = operation sim (Delivery there p) `onException` withdraw sim there p
 
--- | Starts a real thread for a task; it waits for its turn.
+-- | Starts a task and its real thread, which waits for its first turn.
 launch :: Sim -> Int -> Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO (Task, Async ())
-launch sim mother label' body publish = do
+launch sim starter label' body publish = do
   entrance <- newEmptyMVar
   thread <- mask_ $ asyncOnWithUnmask (capability sim) $ \unmask -> do
     uninterruptibleMask_ (takeMVar entrance)
     self <- readIORef (current sim)
     a <- body (arrive sim self) unmask
     uninterruptibleMask_ (leave sim self (publish a))
-  task <- enlist sim mother label' (Just (asyncThreadId thread, entrance)) Unstarted
+  task <- enlist sim starter label' (Just (asyncThreadId thread, entrance)) Unstarted
   pure (task, thread)
 
 enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> Position -> IO Task
-enlist sim mother label' thread here = do
+enlist sim starter label' thread here = do
   entrance <- maybe newEmptyMVar (pure . snd) thread
   n <- readIORef (nextNumber sim)
   writeIORef (nextNumber sim) (n + 1)
-  task <- Task n label' (fst <$> thread) entrance <$> newIORef here <*> newIORef Nothing <*> newIORef [] <*> pure mother
+  task <- Task n label' (fst <$> thread) entrance <$> newIORef here <*> newIORef Nothing <*> newIORef [] <*> pure starter
   modifyIORef' (tasks sim) (IntMap.insert n task)
   for_ (taskThread task) $ \there -> modifyIORef' (threads sim) (Map.insert there task)
   task <$ file sim task
 
 -- | The scheduling point before an operation. When it returns, the calling task has the
--- turn and the operation can be done; or it throws what has arrived.
+-- turn, and the operation can be done. It throws an exception that was thrown to the task.
 operation :: Sim -> Operation -> IO ()
 operation sim op = do
   settle sim
@@ -110,12 +111,13 @@ operation sim op = do
   unless possible' (reschedule sim op)
 {-# INLINE operation #-}
 
--- | Counts a scheduling point; whether who has the turn keeps it, if it can go on.
+-- | Counts a scheduling point. The result: whether the running task keeps the turn there, as
+-- long as it is enabled.
 keepsTurn :: Sim -> IO Bool
 keepsTurn sim = tick sim >>= \n -> (n <) <$> readIORef (nextDecisionAt sim)
 {-# INLINE keepsTurn #-}
 
--- | Runs a transaction, in its turn.
+-- | The operation that runs a transaction.
 transaction :: Sim -> STM a -> IO a
 transaction sim act = do
   settle sim
@@ -130,8 +132,8 @@ transaction sim act = do
     pure result
   waiting look = do
     reschedule sim (Transaction wouldRun look)
-    -- It does run, unless something outside of the simulation undid it just now; or
-    -- the run has ended.
+    -- The transaction commits now, unless something outside of the simulation has just made
+    -- that impossible, or the run has ended.
     tried >>= \case
       Just a -> pure a
       Nothing -> do
@@ -146,7 +148,7 @@ data Undo = Undo
 
 instance Exception Undo
 
--- | Lets the others run, as the policy says, and returns when it is the caller's turn.
+-- | Gives the turn to the task that the policy chooses, and returns in the caller's next turn.
 reschedule :: Sim -> Operation -> IO ()
 reschedule sim op = do
   masking <- getMaskingState
@@ -154,7 +156,7 @@ reschedule sim op = do
     me <- readIORef (current sim)
     ending <- readIORef (unwinding sim)
     if ending
-      then isUnwinding sim me
+      then operationAfterEnd sim me
       else do
         writeIORef (blockedAt me) (Before masking op)
         file sim me
@@ -171,7 +173,7 @@ reschedule sim op = do
 turnTo :: Sim -> Task -> IO ()
 turnTo sim task = writeIORef (current sim) task >> putMVar (gate task) ()
 
--- | The caller has the turn: it raises what was thrown to it.
+-- | Begins the caller's turn: raises the exception that it is to receive, if there is one.
 arrive :: Sim -> Task -> IO ()
 arrive sim me = do
   ending <- readIORef (unwinding sim)
@@ -185,7 +187,7 @@ arrive sim me = do
           recordStep sim (ReceivesException (safeShow (show e)))
           throwIO e
 
--- | The end of a task is an operation too.
+-- | The end of a task, which is an operation too.
 leave :: Sim -> Task -> STM () -> IO ()
 leave sim me publish = do
   ending <- readIORef (unwinding sim)
@@ -208,11 +210,12 @@ leave sim me publish = do
         then endRun sim Nothing
         else tick sim >> choose sim Nothing >>= mapM_ (turnTo sim)
 
--- | The run has ended. Who is not driven yet gives the turn to the driver. Who is has
--- the turn for good: its operations are done at once, and what would wait is unwound
--- instead. One that goes on for ever all the same never runs again.
-isUnwinding :: Sim -> Task -> IO ()
-isUnwinding sim me = do
+-- | An operation after the end of the run. A task that still has the turn from the run returns
+-- it to the driver. A task to which the driver has given the turn keeps it until the task
+-- ends: its operations are done at once, and where it would wait, it is unwound instead. A task
+-- that does not end even then is blocked for ever.
+operationAfterEnd :: Sim -> Task -> IO ()
+operationAfterEnd sim me = do
   isDriven <- readIORef (driverRuns sim)
   if not isDriven
     then putMVar (driverTurn sim) () >> takeMVar (gate me) >> throwIO Unwind
@@ -220,8 +223,8 @@ isUnwinding sim me = do
       n <- readIORef (unwindAttempts sim)
       writeIORef (unwindAttempts sim) $! n + 1
       when (n > 20000) $ do
-        -- While this reference lives, the thread is not woken to be told that it is
-        -- waited for by nobody.
+        -- The stable pointer keeps the gate alive. Otherwise GHC would find the thread
+        -- deadlocked, and wake it with an exception.
         _ <- newStablePtr (gate me)
         modifyIORef' (tasks sim) (IntMap.delete (taskNumber me))
         putMVar (driverTurn sim) ()

@@ -35,18 +35,19 @@ import Behavior.Internal.Sim.Watchdog
 -- >>> import Behavior.Time (now)
 -- >>> import Control.Monad (forever)
 
--- | Runs a behaviour in a simulation, by the undisturbed schedule.
+-- | Runs a behaviour in a simulation, under the non-preemptive schedule.
 --
 -- > simulate  =  simulateWith defaults
 --
--- [Result] What came of it, however it ended: its failures and faults are there too, and
---   so are deadlock, livelock and the mistakes that a simulation finds ('Outcome').
--- [Fault] A simulation inside of a simulation is refused with an 'ErrorCall'.
--- [Cancellation] Of whoever simulates: the run is ended, and it is thrown then.
+-- [Result] How the run ended ('Outcome'): also if the behaviour failed or faulted, and also for a
+--   deadlock, a livelock, and the mistakes that a simulation finds.
+-- [Fault] A simulation inside a simulation throws an 'ErrorCall'.
+-- [Cancellation] When the caller is cancelled, the run is ended, and then the cancellation is
+--   thrown.
 --
--- When it returns or throws, all threads of the run have ended, one after the other,
--- the youngest first. (When the run was cut off, a cleanup's transactions are done and its
--- sleeps are over at once, but what it waits for never comes.)
+-- When it returns or throws, all threads of the run have ended, one after the other, the
+-- youngest first. (When the run was ended early, the transactions of a cleanup still run and its
+-- sleeps end at once, but a transaction that would have to wait is interrupted instead.)
 --
 -- >>> run <- simulate (sleep 3600 >> now)
 -- >>> explain (outcome run)
@@ -58,13 +59,13 @@ import Behavior.Internal.Sim.Watchdog
 simulate :: Behavior a -> IO (Run a)
 simulate = simulateWith defaults
 
--- | 'simulate' as the options say.
+-- | 'simulate' with the given options.
 --
 -- >>> run <- simulateWith defaults {scheduled = Seeded 7} (both (sleep 1) (sleep 2))
 -- >>> finished run
 -- 2.0
 --
--- A behaviour without an end is given one:
+-- A behaviour that does not end needs an end time:
 --
 -- >>> run <- simulateWith defaults {endAt = 10} (forever (sleep 3))
 -- >>> explain (outcome run)
@@ -78,7 +79,7 @@ simulateWith o act = do
   chooser' <- policy (scheduled o)
   simulateBy o chooser' act
 
--- | 'simulateWith', where the policy stands for the schedule.
+-- | 'simulateWith' under the given policy.
 simulateBy :: Options -> Policy -> Behavior a -> IO (Run a)
 simulateBy o chooser' act = do
   nested <- simulator
@@ -98,7 +99,7 @@ simulateBy o chooser' act = do
     count <- readIORef (counter sim)
     uninterruptibleMask_ (unwind sim verdict)
     end <- readIORef result
-    switches <- reverse <$> readIORef (deviations sim)
+    deviating <- reverse <$> readIORef (deviations sim)
     rest <- unused chooser'
     case verdict of
       Left e -> throwIO (e :: SomeException)
@@ -108,7 +109,7 @@ simulateBy o chooser' act = do
             { outcome = outcomeOf v end rest
             , finished = time'
             , steps = made
-            , schedule = Preempting switches
+            , schedule = Preempting deviating
             , points = count
             , leakedThreads = left
             }
@@ -117,7 +118,7 @@ simulationNumber :: IORef Int
 simulationNumber = unsafePerformIO (newIORef 0)
 {-# NOINLINE simulationNumber #-}
 
--- | How the run ended, and how the behaviour did, if it did.
+-- | The outcome, from how the run was ended, the behaviour's result, and the rest of the schedule.
 outcomeOf :: Maybe (Outcome Void) -> Maybe (Either SomeException a) -> [(Int, Int)] -> Outcome a
 outcomeOf cutOff end rest = case (cutOff, rest, end) of
   (Just other, _, _) -> absurd <$> other
@@ -139,22 +140,22 @@ unwind sim verdict = do
   writeIORef (driverRuns sim) True
   next
  where
-  -- Whoever ran has the turn still.
+  -- Whether the task that ran still has the turn.
   keptTurn = case verdict of
     Left _ -> True
     Right (Just (BlockedOutside _ _)) -> True
     Right (Just (TooSlow _ _)) -> True
     Right _ -> False
 
-  -- It gives it back at its next operation, or at its end. If it does not come to either,
-  -- what it waits in is interrupted; and if that does not help it is left behind.
+  -- The task returns the turn at its next operation, or at its end. If it reaches neither,
+  -- the operation in which it waits is interrupted; if that does not help, the task is abandoned.
   recall = do
     returned <- soon 10
     unless returned $ do
       runner <- readIORef (current sim)
       mapM_ (\thread -> forkIO (throwTo thread Unwind)) (taskThread runner)
-      heard <- soon 1000
-      unless heard $ modifyIORef' (tasks sim) (IntMap.delete (taskNumber runner))
+      interrupted <- soon 1000
+      unless interrupted $ modifyIORef' (tasks sim) (IntMap.delete (taskNumber runner))
 
   soon :: Int -> IO Bool
   soon 0 = pure False

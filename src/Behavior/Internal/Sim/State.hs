@@ -1,11 +1,11 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What a simulation is made of.
+-- The data types of a simulation.
 --
--- Each simulated thread is a real one, a 'Task', that runs only while it has the turn
--- and otherwise waits at a gate of its own. Only who has the turn touches the state of the
--- simulation, so that needs no locks.
+-- Each simulated thread is a real thread, a 'Task', that runs only while it has the turn, and
+-- otherwise waits at its own gate. Only the task that has the turn reads and writes the state
+-- of the simulation, so the state needs no locks.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.State
@@ -52,51 +52,51 @@ data Sim = Sim
   { options :: !Options
   , policyOf :: !Policy
   , capability :: !Int
-  -- ^ All tasks are on one, so that handing the turn on is cheap.
+  -- ^ All tasks are on one capability, so that passing the turn costs little.
   , current :: !(IORef Task)
-  -- ^ Who has the turn.
+  -- ^ The task that has the turn.
   , tasks :: !(IORef (IntMap Task))
-  -- ^ Those that have not ended.
+  -- ^ The tasks that have not ended.
   , threads :: !(IORef (Map ThreadId Task))
-  -- ^ The same, but for messengers, by their threads.
+  -- ^ The same without helper tasks, by their threads.
   , ready :: !(IORef (Map Int Task))
-  -- ^ Those that can use the turn, and still can when others have had it.
+  -- ^ The tasks that are known to be enabled: a choice does not check them again.
   , awaiting :: !(IORef (IntMap Task))
-  -- ^ Those at a transaction, which others may make possible or impossible.
+  -- ^ The tasks before a transaction: other tasks can make it possible or impossible.
   , sleepers :: !(IORef (Map (Seconds, Int) Task))
-  -- ^ Those that sleep, by the moment at which they are due.
+  -- ^ The tasks that sleep, by the time at which they are due.
   , nextNumber :: !(IORef Int)
   , time :: !(IORef Seconds)
   , counter :: !(IORef Int)
-  -- ^ The number of the scheduling point.
+  -- ^ The number of the current scheduling point.
   , nextDecisionAt :: !(IORef Int)
-  -- ^ Up to this point, who has the turn keeps it as long as it can go on.
+  -- ^ Before this point, the task that has the turn keeps it as long as it is enabled.
   , rotateAt :: !(IORef Int)
-  -- ^ At this point another has to have its turn.
+  -- ^ At this point another enabled task gets the turn.
   , timeMovedAt :: !(IORef Int)
-  -- ^ At this point the time moved last.
+  -- ^ The point at which the virtual time last advanced.
   , commits :: !(IORef Int)
-  -- ^ How many transactions were run: what a waiting one sees may have changed.
+  -- ^ How many transactions were committed: each may have enabled another one.
   , deviations :: !(IORef [(Int, Int)])
-  -- ^ The decisions that were not the usual ones, the latest first.
+  -- ^ The choices that deviate from the non-preemptive schedule, the latest first.
   , history :: !(IORef [Step])
-  -- ^ The latest first.
+  -- ^ The steps, the latest first.
   , runEnd :: !(MVar (Maybe (Outcome Void)))
-  -- ^ How the run ended. Nothing: as the behaviour did. The thread that puts it has no turn
-  -- any more.
+  -- ^ How the run ended; 'Nothing': as the behaviour did. The task that puts it no longer has
+  -- the turn.
   , unwinding :: !(IORef Bool)
-  -- ^ The run has ended; now its tasks are.
+  -- ^ Whether the run has ended, and its tasks are being ended.
   , driverRuns :: !(IORef Bool)
-  -- ^ The driver has the turn, and lends it to one task after the other.
+  -- ^ Whether the driver (the caller's thread) gives the turn to one task after the other.
   , driverTurn :: !(MVar ())
-  -- ^ The driver gets the turn back.
+  -- ^ Filled when a task returns the turn to the driver.
   , unwindAttempts :: !(IORef Int)
-  -- ^ How many operations the task that is being unwound has tried.
+  -- ^ How many operations the task that is being unwound has begun.
   , responded :: !(IORef Bool)
-  -- ^ Whether the capability has run what the watchdog put into its queue last.
+  -- ^ Whether the capability has run the thread that the watchdog last put into its queue.
   }
 
--- | A simulated thread; or a messenger, which has no thread and only throws.
+-- | A simulated thread; or a helper task, which has no thread and only throws.
 data Task = Task
   { taskNumber :: !Int
   , taskLabel :: !Label
@@ -104,44 +104,44 @@ data Task = Task
   , gate :: !(MVar ())
   , blockedAt :: !(IORef Position)
   , pendingException :: !(IORef (Maybe SomeException))
-  -- ^ What was thrown to it where it could receive it; it raises that when it has the turn.
+  -- ^ An exception that it can receive where it is blocked: it raises this in its next turn.
   , pending :: !(IORef [Pending])
-  -- ^ What was thrown to it where it could not, the newest first.
+  -- ^ Exceptions that it cannot receive there, the newest first.
   , parent :: !Int
   }
 
--- | Where a task stands while it does not have the turn.
+-- | Where a task is blocked while it does not have the turn.
 data Position
   = Unstarted
   | Before !MaskingState !Operation
   | Gone
 
--- | What a task is about to do, as far as it matters to whether it can.
+-- | The next operation of a task, as far as it determines whether the task is enabled.
 data Operation
   = AlwaysEnabled
   | Transaction (IO Bool) !(IORef EnabledCache)
   | Moment !Seconds
-  | -- | A messenger is about to throw.
+  | -- | A helper task is about to throw.
     Throwing !Task SomeException
-  | -- | What it has thrown is pending.
+  | -- | The task waits until this exception, which it threw, is raised.
     Delivery !Task !Pending
 
--- | An exception that GHC itself will raise in its target, as soon as that unmasks: a real
+-- | An exception that GHC itself raises in its target as soon as the target unmasks: a real
 -- thread, on the capability of all tasks, is blocked in a real 'throwTo'.
 data Pending = Pending
   { throwingThread :: !ThreadId
   , thrown :: SomeException
   , released :: !(IORef Bool)
-  -- ^ Whether it was raised or withdrawn, or its target has ended.
+  -- ^ Whether it was raised or withdrawn, or the target has ended.
   , sender :: !(Maybe Task)
-  -- ^ The task that waits for it to be raised; a messenger does not.
+  -- ^ The task that waits until it is raised; 'Nothing' if a helper task threw it.
   }
 
--- | Whether a transaction would have run, when so many had been run; and whether it ever
--- would not have: then its task has begun to wait.
+-- | The number of commits when a transaction was last tried, whether it could commit then,
+-- and whether in any try it could not: then its task has begun to wait.
 data EnabledCache = EnabledCache !Int !Bool !Bool
 
--- | What unwinds a task when the run has ended.
+-- | The exception that unwinds a task when the run has ended.
 data Unwind = Unwind
 
 instance Show Unwind where
@@ -155,12 +155,12 @@ instance Exception Unwind where
 newSim :: Options -> Policy -> IO Sim
 newSim o p = do
   (here, _) <- threadCapability =<< myThreadId
-  firstAsk <- askAt p
+  firstDecision <- askAt p
   box <- newEmptyMVar
   nowhere <- newIORef Unstarted
   nothing <- newIORef Nothing
   none <- newIORef []
-  let noTask = Task (-1) (Label "nobody" "") Nothing box nowhere nothing none (-1)
+  let noTask = Task (-1) (Label "no task" "") Nothing box nowhere nothing none (-1)
   Sim o p here
     <$> newIORef noTask
     <*> newIORef IntMap.empty
@@ -171,7 +171,7 @@ newSim o p = do
     <*> newIORef 0
     <*> newIORef 0
     <*> newIORef 0
-    <*> newIORef (min firstAsk turnLimit)
+    <*> newIORef (min firstDecision turnLimit)
     <*> newIORef turnLimit
     <*> newIORef 0
     <*> newIORef 0
@@ -184,17 +184,17 @@ newSim o p = do
     <*> newIORef 0
     <*> newIORef True
 
--- | For so many points one task may go on in the undisturbed schedule.
+-- | The number of points for which one task keeps the turn in the non-preemptive schedule.
 turnLimit :: Int
 turnLimit = 1000
 
--- | Ends the run. If somebody else has ended it meanwhile, the turn goes to the driver.
+-- | Ends the run. If it was ended already (by the watchdog), the turn goes to the driver.
 endRun :: Sim -> Maybe (Outcome Void) -> IO ()
 endRun sim verdict = do
   first <- tryPutMVar (runEnd sim) verdict
   unless first (putMVar (driverTurn sim) ())
 
--- | Each decision has a number of its own.
+-- | Counts a scheduling point, and returns its number.
 tick :: Sim -> IO Int
 tick sim = do
   n <- (+ 1) <$> readIORef (counter sim)
@@ -202,13 +202,13 @@ tick sim = do
   pure n
 {-# INLINE tick #-}
 
--- | A transaction was run: what others wait for may have changed.
+-- | Counts a committed transaction: it may have enabled other tasks.
 committed :: Sim -> IO ()
 committed sim = do
   n <- readIORef (commits sim)
   writeIORef (commits sim) $! n + 1
 
--- | Puts what the task that has the turn did on record.
+-- | Records a step of the task that has the turn.
 recordStep :: Sim -> StepKind -> IO ()
 recordStep sim what' = do
   me <- readIORef (current sim)
@@ -216,7 +216,7 @@ recordStep sim what' = do
   n <- readIORef (counter sim)
   modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) (parent me) what' :)
 
--- | Likewise, if the record is to be detailed.
+-- | The same, only in a detailed run.
 recordDetail :: Sim -> StepKind -> IO ()
 recordDetail sim what' = when (detailed (options sim)) (recordStep sim what')
 {-# INLINE recordDetail #-}

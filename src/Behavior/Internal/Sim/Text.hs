@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The text of what a user has written.
+-- Texts that the user's code computes.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Text
@@ -13,13 +13,13 @@ import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior.Internal.Failure (isCancellation)
 
--- | The text up to where to compute it throws, which is said then: what describes an
--- exception must not throw another.
+-- | The text up to the place where computing it throws, and then a remark that it throws: the
+-- description of an exception must not throw another one.
 safeShow :: String -> String
 safeShow text = case unsafePerformIO (try (evaluate text) >>= either failing pure) of
   [] -> []
   c : rest -> case unsafePerformIO (try (evaluate c) >>= either (fmap Left . failing) (pure . Right)) of
-    Left usualOtherwise -> usualOtherwise
+    Left remark -> remark
     Right known -> known : safeShow rest
  where
   failing e

@@ -2,10 +2,10 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Whose turn it is.
+-- Which task gets the turn.
 --
--- A task can use the turn if its next operation can be done, or if it receives what was
--- thrown to it. Time moves when no task can do anything.
+-- A task is enabled if its next operation can be done, or if there is an exception that it can
+-- receive. The virtual time advances when no task is enabled.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Turn
@@ -29,7 +29,7 @@ import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
 
--- | Who is next. Nobody when the run has ended by this; then the driver has the turn.
+-- | The task that runs next. 'Nothing': the run has ended here, and the driver has the turn.
 choose :: Sim -> Maybe Task -> IO (Maybe Task)
 choose sim me = do
   enabledTasks <- enabled sim
@@ -37,20 +37,20 @@ choose sim me = do
   moved <- readIORef (timeMovedAt sim)
   rotating <- (n >=) <$> readIORef (rotateAt sim)
   case Map.lookupMin enabledTasks of
-    Nothing -> timeMoves sim >>= \hope -> if hope then choose sim me else pure Nothing
+    Nothing -> advanceTime sim >>= \advanced -> if advanced then choose sim me else pure Nothing
     _ | n - moved > livelockLimit (options sim) -> endWith (Livelock (map taskLabel (Map.elems enabledTasks)))
     Just (first, only)
       | Map.size enabledTasks == 1 -> run n rotating only
       | otherwise -> do
-          let goesOn = Map.member mine enabledTasks && not rotating
+          let canGoOn' = Map.member mine enabledTasks && not rotating
               usualChoice
-                | goesOn = mine
+                | canGoOn' = mine
                 | otherwise = maybe first fst (Map.lookupGT mine enabledTasks)
-          decision <- decided sim n usualChoice goesOn enabledTasks
+          decision <- decided sim n usualChoice canGoOn' enabledTasks
           case decision of
             Nothing -> pure Nothing
             Just task -> do
-              when (goesOn && not (isMe task)) (recordDetail sim IsPreempted)
+              when (canGoOn' && not (isMe task)) (recordDetail sim IsPreempted)
               run n rotating task
  where
   mine = maybe (-1) taskNumber me
@@ -60,29 +60,29 @@ choose sim me = do
   run n rotating task = do
     unfile sim task
     when (rotating || not (isMe task)) (writeIORef (rotateAt sim) $! n + turnLimit)
-    ask <- askAt (policyOf sim)
+    decision <- askAt (policyOf sim)
     rotate <- readIORef (rotateAt sim)
-    writeIORef (nextDecisionAt sim) $! min ask rotate
+    writeIORef (nextDecisionAt sim) $! min decision rotate
     if isJust (taskThread task) then pure (Just task) else throwNow task
 
-  -- A messenger only throws; then somebody else is next.
-  throwNow messenger = do
-    modifyIORef' (tasks sim) (IntMap.delete (taskNumber messenger))
-    readIORef (blockedAt messenger) >>= \case
+  -- A helper task only throws; then another task gets the turn.
+  throwNow helper = do
+    modifyIORef' (tasks sim) (IntMap.delete (taskNumber helper))
+    readIORef (blockedAt helper) >>= \case
       Before _ (Throwing target e) -> void (throwAt sim Nothing target e)
       _ -> pure ()
     _ <- tick sim
     choose sim me
 
--- | Asks the policy for one of these tasks. Nothing: the run has ended by this.
+-- | Lets the policy choose one of these tasks. 'Nothing': the run has ended here.
 decided :: Sim -> Int -> Int -> Bool -> Map Int Task -> IO (Maybe Task)
-decided sim n usualChoice goesOn enabledTasks = do
+decided sim n usualChoice canGoOn' enabledTasks = do
   chosen <-
     decide (policyOf sim) $
       Decision
         { decisionPoint = n
         , usual = usualChoice
-        , canGoOn = goesOn
+        , canGoOn = canGoOn'
         , candidates = Map.keys enabledTasks
         , candidateCount = Map.size enabledTasks
         , candidateAt = \k -> fst (Map.elemAt k enabledTasks)
@@ -93,10 +93,10 @@ decided sim n usualChoice goesOn enabledTasks = do
       when (taskNumber task /= usualChoice) (modifyIORef' (deviations sim) ((n, taskNumber task) :))
       pure (Just task)
 
--- | No task can do anything: time moves on to when one can, and this is true; or the run
--- has ended.
-timeMoves :: Sim -> IO Bool
-timeMoves sim = do
+-- | No task is enabled: either advances the virtual time to the next moment at which one is,
+-- and returns 'True'; or ends the run.
+advanceTime :: Sim -> IO Bool
+advanceTime sim = do
   asleep <- readIORef (sleepers sim)
   case Map.lookupMin asleep of
     Just ((next, _), _) | not (infinite next), next <= end -> later asleep next >>= maybe (pure False) moveTo
@@ -105,9 +105,9 @@ timeMoves sim = do
           modifyIORef' (time sim) (max end)
           endWith OutOfTime
       | otherwise -> do
-          disturbed <- wokenOutside (5 :: Int)
-          who' <- waitingTasks sim (const True)
-          endWith (if disturbed then ExternalWakeup who' else Deadlock who')
+          woken <- wokenFromOutside (5 :: Int)
+          waiting <- waitingTasks sim (const True)
+          endWith (if woken then ExternalWakeup waiting else Deadlock waiting)
  where
   end = endAt (options sim)
   infinite (Seconds s) = isInfinite s
@@ -117,16 +117,16 @@ timeMoves sim = do
     readIORef (counter sim) >>= writeIORef (timeMovedAt sim)
     True <$ wakeUntil sim t
 
-  -- Nothing in the simulation can wake anybody. Something outside might just have: a
-  -- thread of the user's own.
-  wokenOutside 0 = pure False
-  wokenOutside n = do
+  -- No task can enable another. A thread outside of the simulation, started by the user, may
+  -- just have enabled one.
+  wokenFromOutside 0 = pure False
+  wokenFromOutside n = do
     committed sim
     enabledTasks <- enabled sim
-    if Map.null enabledTasks then osSleep 1000 >> wokenOutside (n - 1) else pure True
+    if Map.null enabledTasks then osSleep 1000 >> wokenFromOutside (n - 1) else pure True
 
-  -- How far it moves: to the next moment at which a sleeper is due, or to a later one, as
-  -- long as none is late by 'slip'.
+  -- The new time: the next moment at which a sleeper is due, or a later such moment that is
+  -- less than 'slip' after it.
   later asleep next = case (Map.toAscList within, Map.lookupMin within) of
     (_ : _ : _, Just (usualChoice, _)) -> do
       n <- readIORef (counter sim)
@@ -135,7 +135,7 @@ timeMoves sim = do
       pure (chosen >>= \task -> fst <$> Map.lookup (taskNumber task) within)
     _ -> pure (Just next)
    where
-    -- One sleeper stands for all that are due at the same moment.
+    -- One sleeper represents all that are due at the same moment.
     within = Map.fromList [(k, (t, task)) | (t, (k, task)) <- Map.toList firsts]
     firsts = Map.fromListWith (\_ old -> old) [(t, (k, task)) | ((t, k), task) <- inReach]
     inReach
@@ -143,7 +143,7 @@ timeMoves sim = do
           Map.toAscList (Map.takeWhileAntitone (\(t, _) -> t < next + slip (options sim) && t <= end) asleep)
       | otherwise = []
 
--- | Who of these tasks waits for what.
+-- | What each of these tasks waits for.
 waitingTasks :: Sim -> (Task -> Bool) -> IO [Waiting]
 waitingTasks sim these = do
   alive <- IntMap.elems <$> readIORef (tasks sim)
@@ -153,12 +153,12 @@ waitingTasks sim these = do
   sent target = do
     all' <- readIORef (pending target)
     pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- all', isNothing (sender p)]
-  toReceive target = show (taskLabel target) ++ ", to hear an exception"
+  toReceive target = show (taskLabel target) ++ " to receive an exception"
   reason alive task = \case
     Before _ (Transaction _ _) -> case [show (taskLabel t) | t <- alive, parent t == taskNumber task, isJust (taskThread t)] of
       [] -> "a transaction"
       branches -> "its branches: " ++ commas branches
-    Before _ (Moment _) -> "the end of time"
+    Before _ (Moment _) -> "the end of its sleep"
     Before _ (Delivery target _) -> toReceive target
     _ -> "its turn"
   commas = foldr1 (\a b -> a ++ ", " ++ b)

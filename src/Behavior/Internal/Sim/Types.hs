@@ -2,16 +2,16 @@
 {-# LANGUAGE DeriveFunctor #-}
 
 -- |
--- What goes into a simulation, and what comes out of it.
+-- The options of a simulation, and its results.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Types
-  ( -- * What goes in
+  ( -- * Options
     Options (..)
   , defaults
   , Schedule (..)
 
-    -- * What comes out
+    -- * Results
   , Run (..)
   , Outcome (..)
   , Waiting (..)
@@ -30,25 +30,26 @@ import Behavior.Internal.Seconds (Seconds)
 -- @since 0.1.0.0
 data Options = Options
   { scheduled :: Schedule
-  -- ^ Which thread runs when several could.
+  -- ^ Which thread runs when several are enabled.
   , endAt :: Seconds
-  -- ^ The virtual time at which the run is stopped ('OutOfTime'), also if by then no thread
-  -- can do anything any more; infinite by default.
+  -- ^ The virtual time at which the run is ended ('OutOfTime'), even if no thread is enabled
+  -- any more before it; infinite by default.
   , livelockLimit :: Int
-  -- ^ After so many scheduling points without progress of the virtual time the run is
-  -- stopped ('Livelock'); 100,000 by default.
+  -- ^ After this number of scheduling points during which the virtual time does not advance, the
+  -- run is ended ('Livelock'); 100,000 by default.
   , realTimeLimit :: Seconds
-  -- ^ After so much real time the run is stopped ('TooSlow'); 9 s by default.
+  -- ^ After this amount of real time the run is ended ('TooSlow'); 9 s by default.
   , slip :: Seconds
-  -- ^ A sleeper may be late by less than this: whenever time moves, the schedule may let it
-  -- move on to any moment at which a sleeper is due, less than this after the first. By
-  -- default 0: timers are exact.
+  -- ^ A sleeper may be late by less than this: whenever the virtual time advances, the schedule
+  -- may let it advance to any moment at which a sleeper is due, less than this after the first
+  -- such moment. By default 0: timers are exact.
   , detailed :: Bool
-  -- ^ Whether 'steps' has every operation, and not only what happened to threads and what
-  -- was noted; by default it has not.
+  -- ^ Whether 'steps' contains every operation, and not only the starts and ends of threads,
+  -- the exceptions that they receive, and their notes; by default 'False'.
   }
 
--- | The undisturbed schedule, no end, and the limits that are said with each of 'Options'.
+-- | The non-preemptive schedule, no end, and the defaults that are documented for each field
+-- of 'Options'.
 --
 -- @since 0.1.0.0
 defaults :: Options
@@ -62,35 +63,36 @@ defaults =
     , detailed = False
     }
 
--- | Which thread runs when several could.
+-- | Which thread runs when several are enabled.
 --
 -- @since 0.1.0.0
 data Schedule
-  = -- | A thread runs until it has to wait; then it is the turn of the next that can run,
-    -- round and round.
+  = -- | A thread runs until it has to wait; then the next enabled thread runs, in the order of
+    -- their numbers, and after the last the first again.
     NonPreemptive
-  | -- | The undisturbed one but for some exceptions: at the scheduling point of this
-    -- number, this thread runs. What 'Behavior.Sim.explore' prints is of this form.
+  | -- | The non-preemptive schedule, except that at the scheduling point with the first number
+    -- the thread with the second number runs. 'Behavior.Sim.explore' prints schedules in this
+    -- form.
     Preempting [(Int, Int)]
-  | -- | A random one: the same number, the same schedule.
+  | -- | A random schedule: equal numbers give equal schedules.
     Seeded Int
   deriving (Eq, Show, Read)
 
--- | What came of a simulated run.
+-- | The result of a simulated run.
 --
 -- @since 0.1.0.0
 data Run a = Run
   { outcome :: Outcome a
   , finished :: Seconds
-  -- ^ The virtual time when it ended. It began at 0.
+  -- ^ The virtual time when the run ended. It began at 0.
   , steps :: [Step]
-  -- ^ What happened, from the beginning.
+  -- ^ The steps, from the beginning.
   , schedule :: Schedule
-  -- ^ Replays this very run: a 'Preempting'.
+  -- ^ The schedule that replays this run: a 'Preempting'.
   , points :: Int
-  -- ^ How many scheduling points it had.
+  -- ^ How many scheduling points the run had.
   , leakedThreads :: [Label]
-  -- ^ The threads that had not ended when the behaviour had.
+  -- ^ The threads that had not ended when the run ended.
   }
 
 -- | How a simulated run ended.
@@ -101,27 +103,28 @@ data Outcome a
     Returned a
   | -- | It failed.
     Failing SomeException
-  | -- | It threw anything else that is no cancellation.
+  | -- | It threw any other exception that is not a cancellation.
     Faulting SomeException
-  | -- | It threw a cancellation that nobody had sent to it.
+  | -- | It threw a cancellation that no other thread had thrown to it.
     Cancelled SomeException
-  | -- | All threads wait, and nothing will ever wake one.
+  | -- | All threads wait, and nothing in the simulation will wake one.
     Deadlock [Waiting]
-  | -- | The virtual time stood still for too many scheduling points; the threads that ran last.
+  | -- | The virtual time did not advance for more than 'livelockLimit' scheduling points; the
+    -- threads that were enabled then.
     Livelock [Label]
-  | -- | The virtual time came to 'endAt'.
+  | -- | The virtual time reached 'endAt'.
     OutOfTime
-  | -- | This thread waited for something that is not this library's.
+  | -- | This thread waited outside of the simulation, by an operation that is not this library's.
     BlockedOutside Label Blocked
   | -- | Something that is not part of the simulation changed what these threads waited for.
     ExternalWakeup [Waiting]
-  | -- | The real time came to 'realTimeLimit', while this thread ran; the virtual time was this.
+  | -- | The real time reached 'realTimeLimit' while this thread ran; the virtual time then.
     TooSlow Label Seconds
-  | -- | The schedule is not one of this behaviour: why not.
+  | -- | The schedule does not fit this behaviour; the reason.
     ScheduleMismatch String
   deriving (Functor)
 
--- | Who waits for what.
+-- | A thread, and what it waits for.
 --
 -- @since 0.1.0.0
 data Waiting = Waiting
@@ -130,24 +133,24 @@ data Waiting = Waiting
   }
   deriving (Eq, Show)
 
--- | In what a thread waited, when it was not by this library.
+-- | How a thread waited outside of the simulation.
 --
 -- @since 0.1.0.0
 data Blocked
-  = -- | An @MVar@, or the time: @takeMVar@, @threadDelay@, @System.Timeout@.
+  = -- | At an @MVar@, or for the time: @takeMVar@, @threadDelay@, @System.Timeout@.
     InMVar
-  | -- | A transaction: @retry@ in @Control.Concurrent.STM.atomically@, the waits of @async@.
+  | -- | In a transaction: @retry@ in @Control.Concurrent.STM.atomically@, the waits of @async@.
     InTransaction
-  | -- | Another thread that was thrown to (@throwTo@, @killThread@, @cancel@), and what the
-    -- others waited for meanwhile.
+  | -- | For another thread to receive an exception (@throwTo@, @killThread@, @cancel@); and what
+    -- the other threads waited for meanwhile.
     InThrowing [Waiting]
-  | -- | A value that another thread was computing, up to 'realTimeLimit'.
+  | -- | For a value that another thread was computing, until 'realTimeLimit'.
     InThunk
-  | -- | Anything else.
+  | -- | In any other way.
     Elsewhere
   deriving (Eq, Show)
 
--- | One thing that happened.
+-- | A step of a run.
 --
 -- @since 0.1.0.0
 data Step = Step
@@ -155,29 +158,30 @@ data Step = Step
   , point :: !Int
   -- ^ The number of the scheduling point.
   , number :: !Int
-  -- ^ The number of the thread, in the order in which they were started, from 0.
+  -- ^ The number of the thread: threads are numbered from 0, in the order of their starts.
   , label :: !Label
   , parentNumber :: !Int
-  -- ^ The number of the thread that started it; of the first thread it is -1.
+  -- ^ The number of the thread that started this one; for the first thread -1.
   , did :: StepKind
   }
   deriving (Eq, Show)
 
--- | What a thread did, or what was done to it.
+-- | What a thread did, or received.
 --
 -- @since 0.1.0.0
 data StepKind
   = Starts
   | Ends
   | Note String
-  | -- | An exception arrived that another thread had thrown to it.
+  | -- | It receives an exception that another thread threw to it.
     ReceivesException String
-  | -- | The last four only in a detailed run. It throws an exception to this thread.
+  | -- | It throws an exception to the thread with this number and label. (This and the following
+    -- three are only in the steps of a detailed run.)
     Throws Int Label
   | -- | It runs a transaction.
     Transacts
-  | -- | It sleeps until then.
+  | -- | It sleeps until this time.
     Sleeps Seconds
-  | -- | Another one runs, although this one could go on.
+  | -- | Another thread runs, although this one is enabled.
     IsPreempted
   deriving (Eq, Show)

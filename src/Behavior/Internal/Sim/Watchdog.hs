@@ -1,8 +1,8 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Looks after the simulations that run, by real time: a thread that waits outside of this
--- library, or never gives the turn back, would halt everything.
+-- The watchdog, which checks the running simulations in real time: a thread that waits outside of
+-- this library, or never returns the turn, would block its whole simulation.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Watchdog
@@ -26,13 +26,13 @@ import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn (waitingTasks)
 import Behavior.Internal.Sim.Types
 
--- | The simulations to look after. The watchdog holds on to them: so GHC does not take
--- their threads, which only a waiting thread could wake, for deadlocked.
+-- | The simulations to check. The watchdog keeps them alive. Otherwise GHC would find their
+-- threads, which only a waiting thread can wake, deadlocked.
 watchedSims :: IORef (Map Int Sim, Bool)
 watchedSims = unsafePerformIO (newIORef (Map.empty, False))
 {-# NOINLINE watchedSims #-}
 
--- | Has the simulation of this number looked after while the action runs.
+-- | Runs the action while the watchdog checks the simulation, which has this number.
 watched :: Int -> Sim -> IO a -> IO a
 watched n sim = bracket_ enter (change (\(sims, awake) -> ((Map.delete n sims, awake), ())))
  where
@@ -40,27 +40,27 @@ watched n sim = bracket_ enter (change (\(sims, awake) -> ((Map.delete n sims, a
     awake <- change (\(sims, awake) -> ((Map.insert n sim sims, True), awake))
     unless awake $ do
       (here, _) <- threadCapability =<< myThreadId
-      -- On another capability, if there is one: this one may be kept busy.
+      -- On another capability, if there is one: a task may keep this one busy.
       void (mask_ (forkOn (here + 1) (watchLoop Map.empty 0)))
 
 change :: ((Map Int Sim, Bool) -> ((Map Int Sim, Bool), b)) -> IO b
--- (The map is forced: as a thunk it would keep the simulations that are over.)
+-- (The map is forced: a thunk would keep simulations that have ended alive.)
 change f = atomicModifyIORef' watchedSims (\old -> case f old of new@((sims, _), _) -> sims `seq` new)
 
--- | What was seen of a simulation.
+-- | What the watchdog knows of a simulation.
 data Sample = Sample
   { atPoint :: !Int
   , waits :: !Int
-  -- ^ How often it was seen there, waiting elsewhere.
+  -- ^ How many times it was at this point, and its thread waited outside of the simulation.
   , since :: !Double
-  -- ^ When it was first seen at all.
+  -- ^ The real time of the first check.
   , reported :: !Bool
-  -- ^ Whether its run was ended for that.
+  -- ^ Whether the watchdog has ended the run.
   , warned :: !Bool
-  -- ^ Whether it was said that this did not help.
+  -- ^ Whether the warning was printed that the thread did not stop.
   }
 
--- | Looks every few milliseconds, for as long as there is something to look after.
+-- | Checks every few milliseconds, as long as there are simulations.
 watchLoop :: Map Int Sample -> Int -> IO ()
 watchLoop seen idle = do
   osSleep 5000
@@ -70,11 +70,11 @@ watchLoop seen idle = do
       go <- change (\(now', _) -> if Map.null now' then ((now', False), False) else ((now', True), True))
       when go (watchLoop seen 0)
     else do
-      samples <- Map.traverseWithKey (\n sim -> look sim (Map.lookup n seen)) sims
-      watchLoop samples $! if Map.null sims then idle + 1 else 0 -- a thunk would keep them
+      samples <- Map.traverseWithKey (\n sim -> check sim (Map.lookup n seen)) sims
+      watchLoop samples $! if Map.null sims then idle + 1 else 0 -- a thunk would keep the samples
 
-look :: Sim -> Maybe Sample -> IO Sample
-look sim before = do
+check :: Sim -> Maybe Sample -> IO Sample
+check sim before = do
   n <- readIORef (counter sim)
   runner <- readIORef (current sim)
   status <- maybe (pure ThreadFinished) threadStatus (taskThread runner)
@@ -89,24 +89,24 @@ look sim before = do
                 | otherwise = TooSlow (taskLabel runner) came
               hopeless = t - since sample > allowed + 5
           when (hopeless && not (warned sample)) (warn runner)
-          tell sample {warned = hopeless} verdict
+          endWith verdict sample {warned = hopeless}
       | n == atPoint sample, Just how <- blocked status -> do
           ran <- isResponsive sim
           let seen = if ran then sample {waits = waits sample + 1} else sample
-          -- Whoever was to be unwound, and waits elsewhere for it, is left behind.
+          -- A task that is being unwound, but waits outside of the simulation, is abandoned.
           when (waits seen >= 400) (void (tryPutMVar (driverTurn sim) ()))
           if waits seen < 100
             then pure seen
-            else waitingTasks sim ((/= taskNumber runner) . taskNumber) >>= tell seen . BlockedOutside (taskLabel runner) . how
+            else waitingTasks sim ((/= taskNumber runner) . taskNumber) >>= \waiting -> endWith (BlockedOutside (taskLabel runner) (how waiting)) seen
       | otherwise -> pure sample {atPoint = n, waits = 0}
  where
   Seconds allowed = realTimeLimit (options sim)
-  tell sample verdict = do
+  endWith verdict sample = do
     unless (reported sample) (void (tryPutMVar (runEnd sim) (Just verdict)))
     pure sample {reported = True}
 
--- | Whether the simulation's capability has run what was put at the end of its queue when this
--- was asked last. If not, the machine is late, perhaps just while the turn is handed on.
+-- | Whether the simulation's capability has run the thread that the last call put at the end of its
+-- queue. If not, the machine is slow, and the turn may be about to be passed on.
 isResponsive :: Sim -> IO Bool
 isResponsive sim = do
   ran <- readIORef (responded sim)
@@ -115,9 +115,9 @@ isResponsive sim = do
     void . mask_ $ forkOn (capability sim) (writeIORef (responded sim) True)
   pure ran
 
--- | In what a thread waits, while the others wait for what is given. (Foreign calls are
--- allowed, and to wait for what another thread computes: that ends by itself, or else runs into
--- the limit of real time.)
+-- | How a thread waits outside of the simulation, given what the other threads wait for. (Foreign
+-- calls are allowed, and so is waiting for a value that another thread computes: that ends by
+-- itself, or else at the limit of real time.)
 blocked :: ThreadStatus -> Maybe ([Waiting] -> Blocked)
 blocked (ThreadBlocked reason) = case reason of
   BlockedOnMVar -> Just (const InMVar)
@@ -127,11 +127,11 @@ blocked (ThreadBlocked reason) = case reason of
   _ -> Nothing
 blocked _ = Nothing
 
--- | Note why the process hangs, perhaps: one that does not allocate does not hear that it should
--- stop, and GHC's next garbage collection waits for it.
+-- | Prints a possible reason why the process hangs: a thread that does not allocate cannot receive
+-- the exception that stops it, and GHC's next garbage collection waits for the thread.
 warn :: Task -> IO ()
 warn runner = do
   hPutStrLn stderr $
-    "simulate: " ++ show (taskLabel runner) ++ " does not hear that it should stop. Does it compute without allocating? "
+    "simulate: " ++ show (taskLabel runner) ++ " cannot be stopped. Does it compute without allocating? "
       ++ "Then compile its module with -fno-omit-yields."
   hFlush stderr

@@ -1,8 +1,8 @@
 -- |
--- Simulation as a property of QuickCheck.
+-- Simulations as QuickCheck properties.
 --
--- Each test that QuickCheck runs is a schedule. With 'forAll' around it, behaviours (or
--- worlds, or sensors' readings) are generated too.
+-- Each test that QuickCheck runs is a schedule. With 'forAll' around the property, behaviours
+-- (or worlds, or sensors' readings) are generated too.
 --
 -- >>> import Behavior
 -- >>> import Behavior.Sim
@@ -56,17 +56,17 @@ import qualified Behavior.Sim as Sim
 -- >>> import Behavior.Sim
 -- >>> import Test.QuickCheck
 
--- | Runs a property under a schedule that QuickCheck draws, another for each test.
+-- | Runs a property under a schedule that QuickCheck draws, a new one for each test.
 --
--- The property is given a function that simulates under that schedule, once. What it
--- returns is anything that QuickCheck can test, and the verdict is that of QuickCheck: a
--- discarded test is discarded, 'expectFailure' expects a failure, labels, tables and
--- coverage are counted, and what is generated inside has the test's seed and size. It may
--- also throw, as the expectations of test libraries do.
+-- The property is given a function that simulates under that schedule, once. It returns
+-- anything that QuickCheck can test, and QuickCheck decides as usual: a discarded test is
+-- discarded, 'expectFailure' expects a failure, labels, tables and coverage are counted, and
+-- values that are generated inside have the test's seed and size. It may also throw, as the
+-- expectations of test libraries do.
 --
--- When it fails, the schedule is shrunk first, then what was generated inside, as long as
--- the schedule fits; and 'counterexample' shows what happened. (What is generated around
--- it is shrunk before either.)
+-- When the property fails, the schedule is shrunk first, then the values that were generated
+-- inside, as long as the schedule fits; and 'counterexample' shows the steps. (Values that are
+-- generated around the property are shrunk before both.)
 --
 -- >>> :{
 -- quickCheck . underSchedules $ \simulate -> do
@@ -79,11 +79,11 @@ import qualified Behavior.Sim as Sim
 underSchedules :: Testable prop => ((Behavior a -> IO (Run a)) -> IO prop) -> Property
 underSchedules = underSchedulesOf 1
 
--- | 'underSchedules' that runs the given number of schedules for each test, at least 1: of
--- use when what is generated around it is costly, or more interesting than the schedules.
+-- | 'underSchedules' with the given number of schedules for each test, at least 1: useful if the
+-- values that are generated around it are costly, or more interesting than the schedules.
 --
--- A test is decided by one of them: the first that fails or is discarded, or else the last.
--- Only its labels, tables and coverage count, so that their shares are still shares of tests.
+-- One of the schedules decides a test: the first that fails or is discarded, or else the last.
+-- Only its labels, tables and coverage count, so that percentages are still percentages of tests.
 --
 -- @since 0.1.0.0
 underSchedulesOf :: Testable prop => Int -> ((Behavior a -> IO (Run a)) -> IO prop) -> Property
@@ -96,14 +96,14 @@ underSchedulesOf n body
           underOne = underSchedule (fmap tested . body)
       pure (MkProp (foldr1 orElse (map underOne drawn)))
 
--- | The first if it does not succeed, and the second if it does.
+-- | The first result if it is not a success, otherwise the second.
 orElse :: Rose Result -> Rose Result -> Rose Result
 first `orElse` second = IORose $ do
   decided@(MkRose result _) <- reduceRose first
   if ok result == Just True then reduceRose second else pure decided
 
--- | The verdict under this schedule. If it is a failure, the first thing to try instead is
--- the same under a simpler schedule; then come those that the property itself has to offer.
+-- | The verdict under this schedule. To shrink a failure, a simpler schedule is tried first, and
+-- then the property's own smaller cases.
 underSchedule :: ((Behavior a -> IO (Run a)) -> IO (Rose Result)) -> Schedule -> Rose Result
 underSchedule body drawn = ioRose $ do
   MkRose result smaller <- tried (Replay drawn)
@@ -113,12 +113,12 @@ underSchedule body drawn = ioRose $ do
     latest <- newIORef (MkRose rejected [])
     over <- newIORef Nothing
     shown <- newIORef Nothing
-    -- The property may simulate again when it is shrunk, which is after the exploration.
+    -- While it is shrunk, which is after the exploration, the property may simulate again.
     let simulateBy explored act = maybe (explored act) (later act) =<< readIORef over
         later act chosen = do
           run <- simulateWith (runOptions plan) {scheduled = chosen} act
-          -- What was shrunk need not fit the schedule.
-          when (isMisfit (outcome run)) discard
+          -- The schedule may not fit the shrunk values.
+          when (isMismatch (outcome run)) discard
           modifyIORef shown (fmap (\c -> c {failingSteps = steps run}))
           pure run
         plan = (replaying drawn) {search = how}
@@ -130,24 +130,24 @@ underSchedule body drawn = ioRose $ do
     writeIORef over (Just (either failing (const drawn) found))
     writeIORef shown (either Just (const Nothing) found)
     readIORef latest >>= explained shown
-  isMisfit (ScheduleMismatch _) = True
-  isMisfit _ = False
+  isMismatch (ScheduleMismatch _) = True
+  isMismatch _ = False
   isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 
--- | Adds to each failure what happened in the run that was made for it.
+-- | Adds to each failure the schedule and the steps of its run.
 explained :: IORef (Maybe Sim.Counterexample) -> Rose Result -> IO (Rose Result)
 explained shown rose = do
   MkRose result smaller <- reduceRose rose
   happened <- fmap renderSchedule <$> readIORef shown
-  let with said = result {callbacks = printing said : callbacks result, testCase = said : testCase result}
+  let with shownText = result {callbacks = printing shownText : callbacks result, testCase = shownText : testCase result}
   pure (MkRose (if falsified result then maybe result with happened else result) (map (IORose . explained shown) smaller))
  where
-  printing said = PostFinalFailure Counterexample (\state _ -> putLine (terminal state) said)
+  printing shownText = PostFinalFailure Counterexample (\state _ -> putLine (terminal state) shownText)
 
 falsified :: Result -> Bool
 falsified result = ok result == Just False && expect result
 
--- | Ends a run of the property within 'tryExplore', which takes it for a counterexample.
+-- | Thrown by the property inside 'tryExplore', which then returns a counterexample.
 data Falsified = Falsified
   deriving (Show)
 
@@ -159,20 +159,20 @@ instance Exception Falsified
 anySchedule :: Gen Schedule
 anySchedule = Seeded <$> chooseAny
 
--- | Leaves out switches.
+-- | Leaves out pre-emptions.
 --
 -- @since 0.1.0.0
 shrinkSchedule :: Schedule -> [Schedule]
-shrinkSchedule (Preempting switches) = Preempting <$> shrinkList (const []) switches
+shrinkSchedule (Preempting exceptions) = Preempting <$> shrinkList (const []) exceptions
 shrinkSchedule _ = [NonPreemptive]
 
--- | Two durations that are often the same.
+-- | Two durations that are often equal.
 --
 -- @since 0.1.0.0
 durations :: Gen (Seconds, Seconds)
 durations = (,) <$> duration <*> duration
 
--- | A duration of 0, 1, 2... up to 5 seconds: so that ties are frequent.
+-- | A duration of 0, 1, 2, 3, 4 or 5 seconds: so that ties are frequent.
 --
 -- @since 0.1.0.0
 duration :: Gen Seconds
