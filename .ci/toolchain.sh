@@ -1,8 +1,8 @@
 # shellcheck shell=bash
-# Sourced by the scripts here. Chooses what builds the package; installs from
-# Debian what is missing, where it may.
+# Sourced by the scripts here. Chooses what builds the package; installs what is
+# missing from Debian, where that is possible.
 #
-#   the first of these that is there        BEHAVIOR_TOOLCHAIN  dependencies
+#   the first of these that is found        BEHAVIOR_TOOLCHAIN  dependencies
 #   ------------------------------------    ------------------  -------------------
 #   cabal, GHC and an index of Hackage      cabal               from Hackage
 #   cabal, GHC and the libraries below      cabal-offline       those installed
@@ -11,16 +11,16 @@
 #   Debian's apt-get, as root               (install, then the first line again)
 #   none of them                            (one line that says what to install)
 #
-# "GHC" is GHC 9.0 or later. Set BEHAVIOR_TOOLCHAIN to choose otherwise. Nobody's
-# configuration of cabal or stack is touched.
+# "GHC" is GHC 9.0 or later. Set BEHAVIOR_TOOLCHAIN to choose another one. The user's
+# configuration of cabal and stack is not changed.
 
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-# What cabal, GHC and the programs read and write is UTF-8, whatever the locale.
+# cabal, GHC and the programs read and write UTF-8, whatever the locale is.
 [ "$(locale charmap 2>/dev/null)" = UTF-8 ] || export LC_ALL=C.UTF-8
 
-# The libraries that do not come with GHC, each with its Debian package.
+# The libraries that GHC does not include, each with its Debian package.
 libraries=(
   async:libghc-async-dev
   hspec:libghc-hspec-dev
@@ -34,7 +34,7 @@ die() {
   exit 1
 }
 
-# --- what is there ----------------------------------------------------------
+# --- what is found ----------------------------------------------------------
 
 has() {
   command -v "$1" >/dev/null
@@ -76,7 +76,7 @@ choose() {
   fi
 }
 
-# Chooses once: the scripts that this one starts inherit the choice.
+# Chooses once: the scripts that this one calls inherit the choice.
 find_toolchain() {
   [ -z "${BEHAVIOR_TOOLCHAIN:-}" ] || return 0
   choose || { install "${debian_packages[@]}" && choose; } || die \
@@ -91,8 +91,8 @@ apt_get() {
     -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 "$@" </dev/null
 }
 
-# install PACKAGE...: those of the Debian packages that are missing. Fails where
-# that cannot be: not Debian, not root, no network.
+# install PACKAGE...: installs those of the Debian packages that are missing. Fails
+# where that is impossible: not Debian, not root, or no network.
 install() {
   local package missing=() log
   has apt-get && [ "$(id -u)" = 0 ] || return 1
@@ -103,7 +103,7 @@ install() {
   if [ ${#missing[@]} -gt 0 ]; then
     echo "Installing from Debian: ${missing[*]}" >&2
     log=$(mktemp)
-    # The lists of packages are fetched only when those at hand do not serve.
+    # The package lists are updated only when installing with the present ones fails.
     if ! { apt_get install "${missing[@]}" || { apt_get update && apt_get install "${missing[@]}"; }; } >"$log" 2>&1; then
       tail -n 5 "$log" >&2
       rm -f "$log"
@@ -115,7 +115,7 @@ install() {
   export PATH="/usr/bin:$PATH"
 }
 
-# need PROGRAM...: the Debian packages have the programs' names.
+# need PROGRAM...: installs the programs. Their Debian packages have the same names.
 need() {
   local program
   for program; do
@@ -125,9 +125,8 @@ need() {
 
 # --- building ---------------------------------------------------------------
 
-# Without an index cabal gives up before it has looked at the packages that are
-# installed; an empty repository is index enough. cabal wants its path absolute,
-# and without spaces.
+# Without an index cabal fails before it has looked for installed packages; the index
+# of an empty repository is enough. Its path must be absolute, and without spaces.
 run_cabal() {
   local dir=dist-newstyle/offline url
   if [ "$BEHAVIOR_TOOLCHAIN" = cabal ]; then
@@ -152,7 +151,7 @@ run_stack() {
   stack "${options[@]}" "$@"
 }
 
-# build KIND:NAME...: what the tools say goes to stderr.
+# build KIND:NAME...: the output of the tools goes to stderr.
 build() {
   local targets
   find_toolchain
@@ -166,7 +165,7 @@ build() {
   esac >&2
 }
 
-# binary KIND:NAME: the path of what was built.
+# binary KIND:NAME: prints the path of the built program.
 binary() {
   case $BEHAVIOR_TOOLCHAIN in
     cabal*) run_cabal list-bin --enable-tests "$1" ;;

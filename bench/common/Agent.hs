@@ -14,10 +14,10 @@ import Behavior
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically)
 
--- | A robot, as its program sees it.
+-- | What the program of a robot reads.
 data Agent = Agent
   { battery :: TVar Int
-  , news :: TVar News
+  , progress :: TVar Progress
   }
 
 data Door = Front | Back
@@ -26,16 +26,16 @@ data Door = Front | Back
 data Step = Open Door | PassThrough Door | Task
   deriving (Eq)
 
--- | What the world tells of the robot's latest step.
-data News = None | Done Step | Undone Step
+-- | How the robot's latest step ended, if it has.
+data Progress = None | Done Step | Undone Step
 
 newAgent :: IO Agent
 newAgent = Agent <$> newTVarIO 100 <*> newTVarIO None
 
 -- | Enters the room, by one door or the other, and does the task there; recharges when
--- the battery is low. The action given is done whenever the robot sets out.
+-- the battery is low. The given action runs at each start of the mission.
 mission :: Agent -> Behavior () -> Behavior ()
-mission agent setOut = Signal.monitor batteryLow recharge (setOut >> enterRoom >> does Task)
+mission agent start = Signal.monitor batteryLow recharge (start >> enterRoom >> does Task)
  where
   batteryLow = (< 10) <$> Signal.watching (readTVar (battery agent))
   recharge = atomically (writeTVar (battery agent) 100)
@@ -43,7 +43,7 @@ mission agent setOut = Signal.monitor batteryLow recharge (setOut >> enterRoom >
   enterBy door = does (Open door) >> does (PassThrough door)
   does step =
     atomically $
-      readTVar (news agent) >>= \case
+      readTVar (progress agent) >>= \case
         Done it | it == step -> pure ()
         Undone it | it == step -> failed
         _ -> retry

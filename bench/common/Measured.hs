@@ -1,7 +1,7 @@
 -- |
--- How the benchmarks measure, and tell.
+-- How the benchmarks measure and print.
 module Measured
-  ( -- * Telling
+  ( -- * Printing
     line
 
     -- * Measuring
@@ -11,12 +11,12 @@ module Measured
   , peakResidentBytes
   , quantile
 
-    -- * Waiting for many
-  , Muster
-  , musterOf
-  , again
-  , arrive
-  , complete
+    -- * Waiting for many threads
+  , Latch
+  , newLatch
+  , resetLatch
+  , countDown
+  , awaitLatch
   ) where
 
 import Control.Concurrent.MVar (MVar, newEmptyMVar, putMVar, takeMVar)
@@ -28,49 +28,50 @@ import Numeric (showFFloat)
 import System.CPUTime (getCPUTime)
 import System.IO (hFlush, stdout)
 
--- | A line for each figure: its name, a tabulator, and the figure as a plain decimal.
+-- | Prints a figure on a line: its name, a tab, and the figure as a plain decimal.
 line :: String -> Double -> IO ()
 line name value = putStrLn (name ++ "\t" ++ showFFloat (Just 7) value "") >> hFlush stdout
 
--- | What the clock shows, in nanoseconds.
+-- | The monotonic time, in nanoseconds.
 time :: IO Double
 time = fromIntegral <$> getMonotonicTimeNSec
 
--- | What the process has used of the processors, in nanoseconds.
+-- | The processor time that the process has used, in nanoseconds.
 processorTime :: IO Double
 processorTime = (/ 1e3) . fromIntegral <$> getCPUTime
 
--- | What the process has in memory.
+-- | The resident memory of the process.
 residentBytes :: IO Double
 residentBytes = do
   sizes <- words <$> readFile "/proc/self/statm"
   evaluate (4096 * read (sizes !! 1))
 
--- | The most that the process has had in memory.
+-- | The highest resident memory of the process so far.
 peakResidentBytes :: IO Double
 peakResidentBytes = do
   status <- map words . lines <$> readFile "/proc/self/status"
   evaluate (sum [1024 * read kilobytes | "VmHWM:" : kilobytes : _ <- status])
 
--- | The value that this part of the sorted samples does not exceed.
+-- | The value that the given part of the sorted samples does not exceed.
 quantile :: Double -> [Double] -> Double
 quantile part sorted = sorted !! (ceiling (part * fromIntegral (length sorted)) - 1)
 
--- | Where many threads are awaited. Each comes by without waiting.
-data Muster = Muster (IORef Int) (MVar ())
+-- | Opens when it has been counted down to zero. To count down does not block.
+data Latch = Latch (IORef Int) (MVar ())
 
--- | Awaits so many threads.
-musterOf :: Int -> IO Muster
-musterOf n = Muster <$> newIORef n <*> newEmptyMVar
+-- | A latch for the given number of threads.
+newLatch :: Int -> IO Latch
+newLatch n = Latch <$> newIORef n <*> newEmptyMVar
 
--- | Awaits so many once more, when it is complete.
-again :: Muster -> Int -> IO ()
-again (Muster missing _) = writeIORef missing
+-- | Sets an opened latch to a number again.
+resetLatch :: Latch -> Int -> IO ()
+resetLatch (Latch missing _) = writeIORef missing
 
-arrive :: Muster -> IO ()
-arrive (Muster missing whole) = do
+countDown :: Latch -> IO ()
+countDown (Latch missing opened) = do
   left <- atomicModifyIORef' missing (\n -> (n - 1, n - 1))
-  when (left == 0) (putMVar whole ())
+  when (left == 0) (putMVar opened ())
 
-complete :: Muster -> IO ()
-complete (Muster _ whole) = takeMVar whole
+-- | Waits until the latch opens.
+awaitLatch :: Latch -> IO ()
+awaitLatch (Latch _ opened) = takeMVar opened

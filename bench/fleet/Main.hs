@@ -1,7 +1,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What a fleet costs: many agents in one process. A line for each figure.
+-- What a fleet costs: many agents in one process. Prints a line for each figure.
 module Main (main) where
 
 import Control.Concurrent
@@ -31,50 +31,50 @@ main =
       ["idle", n] -> idle "fleet" apart (read n)
       ["together", n] -> idle "fleet together" together (read n)
       ["bare", n] -> bare (read n)
-      ["polled", n] -> asked "fleet polled" (\low -> Signal.monitor low (pure ())) (read n)
+      ["polled", n] -> polled "fleet polled" (\low -> Signal.monitor low (pure ())) (read n)
       ["woken", n] -> woken (read n)
-      ["waiting", n] -> asked "fleet waited" (\low _ -> Signal.waitUntil low) (read n)
+      ["waiting", n] -> polled "fleet waited" (\low _ -> Signal.waitUntil low) (read n)
       _ -> die "usage: fleet (idle | together | bare | polled | waiting | woken) AGENTS"
  where
-  -- Agents that come and go each by itself; and those of one behaviour.
+  -- Each agent in its own thread, or all in one behaviour.
   apart missions measure = for_ missions forkIO >> measure
   together missions measure = void (allOf missions) ||| measure
 
--- | Agents for which nothing happens; and then something, for all at once.
+-- | Agents for which nothing changes; then the battery of all becomes low at once.
 idle :: String -> ([Behavior ()] -> IO () -> IO ()) -> Int -> IO ()
 idle name alongside n = do
   agents <- replicateM n newAgent
-  waiting <- musterOf n
-  let missions = [mission agent (arrive waiting) | agent <- agents]
+  latch <- newLatch n
+  let missions = [mission agent (countDown latch) | agent <- agents]
   before <- residentBytes
   begun <- time
   alongside missions $ do
-    atRest name n before begun waiting
-    again waiting n
+    atRest name n before begun latch
+    resetLatch latch n
     changed <- time
     for_ agents $ \agent -> atomically (writeTVar (battery agent) 5)
-    complete waiting
+    awaitLatch latch
     recovered <- time
     line (name ++ " wake " ++ show n) ((recovered - changed) / fromIntegral n)
 
--- | The least that as many threads as the agents have can cost: each waits for a variable.
+-- | The lower bound: the same number of threads, each of which waits for a variable.
 bare :: Int -> IO ()
 bare n = do
   variables <- replicateM n (newTVarIO False)
-  waiting <- musterOf (2 * n)
+  latch <- newLatch (2 * n)
   before <- residentBytes
   begun <- time
   for_ variables $ \variable ->
-    replicateM_ 2 . forkIO $ arrive waiting >> STM.atomically (readTVar variable >>= check)
-  atRest "bare fleet" n before begun waiting
-  -- Until here the variables must live, or the threads would be taken for deadlocked.
+    replicateM_ 2 . forkIO $ countDown latch >> STM.atomically (readTVar variable >>= check)
+  atRest "bare fleet" n before begun latch
+  -- Keeps the variables alive until here: otherwise GHC would detect a deadlock.
   for_ variables $ \variable -> STM.atomically (writeTVar variable True)
 
--- | Awaits all, and tells what each has cost since the size and time given, and what all
--- cost when nothing happens.
-atRest :: String -> Int -> Double -> Double -> Muster -> IO ()
-atRest name n before begun waiting = do
-  complete waiting
+-- | Waits for all agents. Prints what each has cost since the given size and time, and what all
+-- cost while nothing changes.
+atRest :: String -> Int -> Double -> Double -> Latch -> IO ()
+atRest name n before begun latch = do
+  awaitLatch latch
   created <- time
   used <- processorTime
   sleep 2
@@ -85,16 +85,16 @@ atRest name n before begun waiting = do
   line (name ++ " bytes " ++ show n) ((after - before) / fromIntegral n)
   line (name ++ " idle cpu " ++ show n) (usedSince / (rested - created))
 
--- | Agents that each ask a sensor ten times a second.
-asked :: String -> (Signal.Signal Bool -> Behavior () -> Behavior ()) -> Int -> IO ()
-asked name operator n = readings name n $ \sensors measure ->
+-- | Agents that each poll a sensor ten times a second.
+polled :: String -> (Signal.Signal Bool -> Behavior () -> Behavior ()) -> Int -> IO ()
+polled name operator n = readings name n $ \sensors measure ->
   void (allOf [operator ((< 10) <$> Signal.polling 0.1 sensor) (STM.atomically retry) | sensor <- sensors]) ||| measure
 
--- | The least that a thread for each sensor can cost: somebody else looks at the clock, and
--- fills a variable for each, ten times a second.
+-- | The lower bound for one thread per sensor: another thread wakes them all, by an 'MVar' each,
+-- ten times a second.
 woken :: Int -> IO ()
 woken n = readings "bare fleet" n $ \sensors measure -> do
-  -- (Like ours, each compares what it has read.)
+  -- (Like the operator, each compares what it has read.)
   ticks <- for sensors $ \sensor -> do
     tick <- newEmptyMVar
     _ <- forkIO . forever $ do
@@ -105,18 +105,18 @@ woken n = readings "bare fleet" n $ \sensors measure -> do
   _ <- forkIO . forever $ for_ ticks (`tryPutMVar` ()) >> threadDelay 100000
   measure
 
--- | Tells what a reading costs, and how many of those that are due are made, of so many
--- sensors.
+-- | Prints what a reading costs with the given number of sensors, and the fraction of the due
+-- readings that are made.
 readings :: String -> Int -> ([IO Int] -> IO () -> IO ()) -> IO ()
 readings name n alongside = do
   level <- newIORef (50 :: Int)
-  -- Each counts in a place of its own, which only its own sensor's thread writes.
+  -- Each sensor has its own counter, which only its thread writes.
   counts <- callocArray n
   let readSensor count = (peek count >>= poke count . (+ 1)) >> readIORef level
       made = sum <$> peekArray n counts :: IO Int
   alongside (map (readSensor . advancePtr counts) [0 .. n - 1]) $ do
-    -- Until the start is over, what it left is out of the way, and what lives is taken for
-    -- old: that is so after two collections.
+    -- Waits until all have started. Two garbage collections then remove the garbage of the start,
+    -- and promote what is live to the old generation.
     sleep 1
     replicateM_ 2 performMajorGC
     sleep 1

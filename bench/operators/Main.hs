@@ -1,9 +1,9 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What the operators cost, and what does the same by hand: a few rounds, each with a line
--- for each. In a round all take turns, so that the machine's moods meet all alike. (A
--- tool that measures one thing after the other would give each a mood of its own.)
+-- What the operators cost, and what the same costs by hand: a few rounds, each of which prints a
+-- line for each case. In a round all cases run in turn, so that noise affects all of them
+-- equally. (In a tool that measures each case in one go, it would affect single cases.)
 module Main (main) where
 
 import Control.Concurrent (forkIO, killThread, newEmptyMVar, putMVar, runInUnboundThread, takeMVar, threadDelay, yield)
@@ -38,23 +38,24 @@ measureOperators = do
   nevers <- replicateM 1100 newEmptyMVar
   quiet <- newTVarIO False
   state <- newIORef 0
-  -- Each waits for something of its own: after those who wait for the same, and are stopped,
-  -- GHC may leave a queue that keeps them in memory.
+  -- Each waits for its own MVar: when threads that wait for the same MVar are stopped, GHC may
+  -- leave a queue that keeps them in memory.
   let waits = map takeMVar nevers
       blocked = head waits
-      steps = [looks state n | n <- [1 .. 100000]]
+      steps = [checksState state n | n <- [1 .. 100000]]
   measureAll (pairs blocked ++ watched quiet blocked ++ many waits ++ long steps)
-  -- In reach to the end, or they who wait for it would be told that it never comes.
+  -- Keeps the MVars alive until here: otherwise GHC would detect a deadlock.
   mapM_ (`putMVar` ()) nevers
 
--- | There and back: to come second makes a difference of a tenth to what is so short.
+-- | In both orders: for cases as short as these, being measured second makes a difference of a
+-- tenth.
 measureAll :: [Case] -> IO ()
 measureAll cases = replicateM_ 2 (mapM_ measure (cases ++ reverse cases))
 
--- | Its name, how often to do it, and how to do it so many times.
+-- | Its name, how often to run it, and how to run it the given number of times.
 data Case = Case String Int (Int -> Behavior ())
 
--- | What is done anew each time.
+-- | Runs the action each time.
 each :: String -> Int -> Behavior a -> Case
 each name times act = Case name times (\n -> replicateM_ n (void act))
 
@@ -66,14 +67,14 @@ trying =
   , each "? that fails" 1000000 (fails ? succeeds)
   ]
 
--- | What '?' is, by hand.
+-- | The same as '?', by hand.
 bare :: Behavior () -> Behavior ()
 bare act =
   try act >>= \case
     Right () -> pure ()
     Left BehaviorFailed {} -> succeeds
 
--- The compiler must not see what they do.
+-- Not inlined: the compiler must not know what they do.
 succeeds, fails :: Behavior ()
 succeeds = pure ()
 {-# NOINLINE succeeds #-}
@@ -94,13 +95,13 @@ pairs blocked =
 
 watched :: TVar Bool -> Behavior () -> [Case]
 watched quiet blocked =
-  [ each "monitor, undisturbed" 20000 (Signal.monitor (watch quiet) succeeds succeeds)
-  , each "rSelect, undisturbed" 20000 (Signal.rSelect (watch quiet) succeeds succeeds)
+  [ each "monitor, uninterrupted" 20000 (Signal.monitor (watch quiet) succeeds succeeds)
+  , each "rSelect, uninterrupted" 20000 (Signal.rSelect (watch quiet) succeeds succeeds)
   , each "monitor, polled" 5000 (monitor (pure False) succeeds succeeds)
   , Case "interruption, recovery and restart" 10000 (interruptions blocked)
   ]
 
--- | The task itself makes the condition true, so many times, and then completes.
+-- | The task itself makes the condition true, the given number of times, and then completes.
 interruptions :: Behavior () -> Int -> Behavior ()
 interruptions blocked times = do
   low <- newTVarIO False
@@ -121,20 +122,20 @@ many waits =
       [ [ about n "asum of Concurrently" $ \size ->
             runConcurrently (asum (map Concurrently (succeeds : take (size - 1) waits)))
         , about n "mapConcurrently_" (\size -> mapConcurrently_ id (replicate size succeeds))
-        , Case ("a look at variables " ++ show n) (100000 `div` n) (looksAt n)
+        , Case ("transaction reading variables " ++ show n) (100000 `div` n) (readsAll n)
         ]
       | n <- [10, 100, 1000]
       ]
     ++ [Case ("teleoReactive " ++ show n) (100000 `div` n) (changes (head waits) n) | n <- [10, 100, 1000]]
 
--- | So many, give or take a tenth: of just so many the collector might meet each at the same
--- moment of its life, the best or the worst.
+-- | The given number of branches, more or less a tenth: with a fixed number the garbage
+-- collections might come at the same moment of each run, the best or the worst one.
 about :: Int -> String -> (Int -> Behavior ()) -> Case
 about n name act = Case (name ++ " " ++ show n) (21000 `div` n * 2) (\times -> mapM_ act (take times (cycle sizes)))
  where
   sizes = [n - n `div` 10, n - n `div` 10 + max 1 (n `div` 100) .. n + n `div` 10]
 
--- | What 'firstOf' cannot do without: threads that are started, wait, and are stopped.
+-- | The lower bound of 'firstOf': threads that are started, wait, and are stopped.
 stopping :: [Behavior ()] -> Behavior ()
 stopping waits = do
   threads <- mapM forkIO waits
@@ -142,8 +143,8 @@ stopping waits = do
   mapM_ killThread threads
   yield
 
--- | So many changes of the first rule that holds: from the last rule to the one in the
--- middle, whose condition comes and goes, and back.
+-- | The given number of changes of the first rule that holds: from the last rule to the one in
+-- the middle, whose condition becomes true and false, and back.
 changes :: Behavior () -> Int -> Int -> Behavior ()
 changes blocked rules times = do
   flags <- replicateM rules (newTVarIO False)
@@ -153,10 +154,10 @@ changes blocked rules times = do
   Signal.teleoReactive $
     [(watch flag, turning False) | flag <- init flags] ++ [(pure True, turning True)]
 
--- | What a change takes several times, besides the stop and the start of a branch: all the
--- conditions seen at one moment.
-looksAt :: Int -> Int -> Behavior ()
-looksAt n times = do
+-- | A change does this several times, besides the stop and the start of a branch: it reads all
+-- the conditions in one transaction.
+readsAll :: Int -> Int -> Behavior ()
+readsAll n times = do
   flags <- replicateM n (newTVarIO False)
   replicateM_ times (STM.atomically (mapM_ readTVar flags))
 
@@ -175,10 +176,10 @@ long steps =
  where
   often program n = replicateM_ (n `div` length steps) program
 
--- | An action that looks at the state of the robot, and is content.
-looks :: IORef Int -> Int -> Behavior ()
-looks state n = readIORef state >>= \seen -> when (seen > n) failed
-{-# NOINLINE looks #-}
+-- | An action that checks the state of the robot, and succeeds.
+checksState :: IORef Int -> Int -> Behavior ()
+checksState state n = readIORef state >>= \current -> when (current > n) failed
+{-# NOINLINE checksState #-}
 
 watch :: TVar Bool -> Signal.Signal Bool
 watch = Signal.watching . readTVar
@@ -196,27 +197,27 @@ measure (Case name times act) = do
   ended <- time
   line name ((ended - begun) / fromIntegral times)
 
--- | Ordered rules of which nothing changes.
+-- | Ordered rules of which no condition changes.
 measureIdle :: Int -> IO ()
 measureIdle rules = do
   flags <- replicateM rules (newTVarIO False)
   idling ("teleoReactive idle cpu " ++ show rules) (Signal.teleoReactive [(watch flag, succeeds) | flag <- flags])
-  -- In reach to the end.
+  -- Keeps the variables alive until here.
   forM_ flags (`set` True)
 
--- | A thread that waits, and nothing else.
+-- | A thread that only waits.
 measureBareIdle :: IO ()
 measureBareIdle = do
   flag <- newTVarIO False
   idling "bare thread idle cpu" (STM.atomically (readTVar flag >>= STM.check))
   set flag True
 
--- | Seconds of the processor's time in a second in which the behaviour waits.
+-- | Processor seconds per second while the behaviour waits.
 idling :: String -> Behavior () -> IO ()
 idling name behavior =
   withAsync behavior . const $ do
-    -- For some time after anything has run, now and at the end, the runtime's clock ticks
-    -- and it collects its garbage.
+    -- For some time after a thread has run, the runtime's timer ticks, and an idle garbage
+    -- collection runs. That is so at the start and at the end.
     threadDelay 500000
     before <- processorTime
     threadDelay 4000000

@@ -1,10 +1,10 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- How long it takes from the change of a condition to the first step of the recovery, and,
--- to compare, to the first step of a thread that waits for nothing but that change: while
--- nothing else goes on, or other agents wait, or another thread computes without end. A line
--- for each figure, in microseconds.
+-- How long it takes from the change of a condition to the first step of the recovery and, to
+-- compare, to the first step of a thread that waits only for that change: while nothing else
+-- runs, while other agents wait, or while another thread computes endlessly. Prints a line for
+-- each figure, in microseconds.
 module Main (main) where
 
 import Control.Concurrent
@@ -37,13 +37,13 @@ import Behavior
 import qualified Behavior.Signal as Signal
 import Measured
 
--- | What a reaction is made of.
+-- | What a reaction uses.
 data Stage = Stage
   { flag :: TVar Bool
   -- ^ The condition.
   , ready :: MVar ()
-  -- ^ Filled whenever a change may come.
-  , noted :: IORef Double
+  -- ^ Filled when the next change may be made.
+  , reactedAt :: IORef Double
   -- ^ When the latest reaction took its first step.
   }
 
@@ -51,18 +51,19 @@ main :: IO ()
 main =
   runInUnboundThread $
     getArgs >>= \case
-      who : others | Just reacts <- lookup who reactors -> meanwhile others >>= measured who reacts
+      variant : others
+        | Just reacts <- lookup variant reactors -> startLoad others >>= measured variant reacts
       _ -> usage
  where
   reactors = [("ours", ours), ("by hand", byHand), ("bare", bare)]
 
--- | Begins what goes on meanwhile, and gives what the figures are called by.
-meanwhile :: [String] -> IO String
-meanwhile = \case
+-- | Starts the load, and gives its part of the figures' names.
+startLoad :: [String] -> IO String
+startLoad = \case
   [] -> processors
   [kind] | Just computation <- lookup kind computations -> do
-    -- Not where this thread is, and all that it starts, if there is another capability.
-    -- (The first is not always this one's.)
+    -- On another capability than this thread and those that it starts, if there is one.
+    -- (This thread is not always on the first.)
     (mine, _) <- threadCapability =<< myThreadId
     _ <- forkOn (mine + 1) computation
     ((kind ++ " ") ++) <$> processors
@@ -81,8 +82,8 @@ ours stage = Signal.monitor (Signal.watching (readTVar (flag stage))) (reaction 
  where
   task = putMVar (ready stage) () >> sleep 3600
 
--- | The same steps by hand, and not one more: who hears of the change stops the task, hears
--- that it has ended, and has another thread recover.
+-- | Exactly the same steps by hand: a thread waits for the change, stops the task, waits for its
+-- end, and starts another thread for the recovery.
 byHand :: Stage -> IO ()
 byHand stage = forever $ do
   ended <- newEmptyMVar
@@ -94,22 +95,22 @@ byHand stage = forever $ do
   _ <- forkIO (reaction stage >> putMVar recovered ())
   takeMVar recovered
 
--- | The least that a reaction can be.
+-- | The lower bound.
 bare :: Stage -> IO ()
 bare stage = forever $ do
   putMVar (ready stage) ()
   STM.atomically (readTVar (flag stage) >>= check)
   reaction stage
 
--- | Notes the time before anything else.
+-- | Stores the time first.
 reaction :: Stage -> IO ()
 reaction stage = do
-  time >>= writeIORef (noted stage)
+  time >>= writeIORef (reactedAt stage)
   STM.atomically (writeTVar (flag stage) False)
 
--- | Changes the condition again and again, whenever all has been quiet for a moment.
+-- | Changes the condition repeatedly, each time after a short pause.
 measured :: String -> (Stage -> IO ()) -> String -> IO ()
-measured who reacts beside = do
+measured variant reacts load = do
   stage <- Stage <$> newTVarIO False <*> newEmptyMVar <*> newIORef 0
   _ <- forkIO (reacts stage)
   takeMVar (ready stage)
@@ -118,15 +119,15 @@ measured who reacts beside = do
         changed <- time
         STM.atomically (writeTVar (flag stage) True)
         takeMVar (ready stage)
-        reacted <- readIORef (noted stage)
+        reacted <- readIORef (reactedAt stage)
         pure ((reacted - changed) / 1000)
   _ <- during 0.2 sample
   sorted <- sort <$> during 3 sample
   for_ [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999)] $ \(name, part) ->
-    line (unwords ["reaction", beside, name, who]) (quantile part sorted)
+    line (unwords ["reaction", load, name, variant]) (quantile part sorted)
 
--- | Does it again and again, for so many seconds. In a loop that needs no stack: the runtime
--- looks through the stack of a thread that waits, before the next one runs.
+-- | Repeats the action for the given number of seconds. The loop needs no stack, because the
+-- runtime walks through the stack of a thread that blocks, before the next thread runs.
 during :: Double -> IO a -> IO [a]
 during seconds act = do
   begun <- time
@@ -136,18 +137,18 @@ during seconds act = do
         (if over then pure else go) (result : results)
   go []
 
--- | Waits as the driver of a device does: outside of the runtime, all of whose threads are
--- idle meanwhile, and without its timers, which the sleeping task may use too.
+-- | Waits as the driver of a device does: outside GHC's runtime, whose threads are all idle
+-- meanwhile, and without its timers, which the sleeping task may use too.
 foreign import ccall safe "usleep" usleep :: CUInt -> IO CInt
 
--- | Other agents, for which nothing happens.
+-- | Other agents, for which nothing changes.
 crowd :: Int -> IO ()
 crowd n = when (n > 0) $ do
-  waiting <- musterOf n
-  replicateM_ n (newAgent >>= \agent -> forkIO (mission agent (arrive waiting)))
-  complete waiting
+  latch <- newLatch n
+  replicateM_ n (newAgent >>= \agent -> forkIO (mission agent (countDown latch)))
+  awaitLatch latch
 
--- | A search, which allocates all the time, and keeps little: all ways to place the queens.
+-- | A search that allocates all the time, and keeps little alive: all ways to place the queens.
 searching :: IO ()
 searching = for_ (cycle [6, 7, 8]) $ evaluate . length . queens
 
@@ -158,11 +159,11 @@ queens n = go n
   go k = [q : others | others <- go (k - 1 :: Int), q <- [1 .. n], and (zipWith (apart q) others [1 ..])]
   apart q other distance = q /= other && abs (q - other) /= distance
 
--- | A calculation that hardly allocates: it can be interrupted every few microseconds.
+-- | A calculation that allocates little: it can be interrupted every few microseconds.
 counting :: IO ()
 counting = for_ [1 ..] $ evaluate . steps 10000
 
--- | The numbers of a generator.
+-- | Steps of a random number generator.
 steps :: Int -> Int -> Int
 steps n seed
   | n == 0 = seed

@@ -1,6 +1,6 @@
 -- |
--- What the operators cost: a line for nanoseconds, and one for allocated bytes. It is
--- built twice, with the switch in the seam and without, and its argument says which it is.
+-- What the operators cost: a line for nanoseconds, and one for allocated bytes. It is built twice,
+-- with the dispatch to simulations and without; its argument (with, without) is part of the names.
 module Main (main) where
 
 import Control.Concurrent (runInUnboundThread)
@@ -17,7 +17,7 @@ import Behavior.Time (atomically, now)
 
 main :: IO ()
 main = runInUnboundThread $ do
-  switch <- unwords <$> getArgs
+  dispatch <- unwords <$> getArgs
   level <- newTVarIO (50 :: Int)
   let low = (< 10) <$> Signal.watching (readTVar level)
       measured =
@@ -39,9 +39,9 @@ main = runInUnboundThread $ do
     after <- allocated
     let nanoseconds = realToFrac (ended - begun) * 1e9 / fromIntegral times :: Double
         bytes = (after - before) `div` fromIntegral times
-        report unit figure = putStrLn ("seam " ++ switch ++ " " ++ unit ++ ": " ++ name ++ "\t" ++ figure)
+        report unit figure = putStrLn ("seam " ++ dispatch ++ " " ++ unit ++ ": " ++ name ++ "\t" ++ figure)
     report "ns" (show nanoseconds)
     report "bytes" (show bytes)
  where
-  -- Each thread's account is settled when it has run, or by a collection.
+  -- What a thread has allocated is counted when it has run, or by a garbage collection.
   allocated = performMinorGC >> allocated_bytes <$> getRTSStats

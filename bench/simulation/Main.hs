@@ -1,6 +1,6 @@
 -- |
--- How fast the simulator is: one round, a line for each figure. With @memory random@ or
--- @memory exhaustive@: how much memory an exploration of a million schedules takes.
+-- How fast the simulator is: one round, with a line for each figure. With @memory random@ or
+-- @memory exhaustive@: how much memory the exploration of a million schedules takes.
 module Main (main) where
 
 import Control.Concurrent (runInUnboundThread)
@@ -49,7 +49,7 @@ speed = do
   scheduledBy seed = simulateWith defaults {scheduled = Seeded seed} mission
   aDay = Signal.monitor ((< 0) <$> Signal.polling 1 (pure (1 :: Int))) (pure ()) (forM_ [1 .. 1000 :: Int] (const (sleep 86.4)))
 
--- | What is live after 20,000 schedules and after 200,000, and the most that the process had.
+-- | The live memory after 20,000 schedules and after 200,000, and the highest resident memory.
 memory :: String -> Plan -> IO ()
 memory name plan = do
   tried <- newIORef (0 :: Int)
@@ -61,30 +61,30 @@ memory name plan = do
       live <- gcdetails_live_bytes . gc <$> getRTSStats
       modifyIORef' measured ((n, live) :)
     void (simulated (missionWith (Signal.debounce 0.5)))
-  -- Only now: to print takes memory, too.
+  -- Printed at the end, because printing takes memory, too.
   readIORef measured >>= mapM_ (\(n, live) -> line (name ++ " schedules, live " ++ show n) (fromIntegral live))
   line (name ++ " schedules, resident") =<< peakResidentBytes
 
--- | A battery that gets low twice, under a limit of time.
+-- | A battery that becomes low twice, under a time limit.
 mission :: Behavior ()
 mission = missionWith id
 
--- | Its signal may be refined.
+-- | The same, with a filter on its signal.
 missionWith :: (Signal.Signal Bool -> Signal.Signal Bool) -> Behavior ()
-missionWith refined = do
+missionWith filtered = do
   battery <- newTVarIO (20 :: Int)
-  let low = refined ((< 10) <$> Signal.watching (readTVar battery))
+  let low = filtered ((< 10) <$> Signal.watching (readTVar battery))
       use n = atomically (readTVar battery >>= \b -> writeTVar battery (b - n))
       recharge = sleep 1 >> atomically (writeTVar battery 100)
   Signal.monitor low recharge (sleep 1 >> use 15 >> sleep 1) ||| sleep 10
 
--- | How many of what the action counts it does in a second.
+-- | Prints how much of what the action counts it does per second.
 perSecond :: String -> IO Int -> IO ()
 perSecond name act = do
   (n, seconds) <- timed act
   line name (fromIntegral n / seconds)
 
--- | Also how many seconds it took.
+-- | Gives also how many seconds it took.
 timed :: IO a -> IO (a, Double)
 timed act = do
   begun <- time

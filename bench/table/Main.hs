@@ -1,16 +1,16 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- The table of what was promised of speed, what was measured, and whether it is met.
+-- The table of the targets, the measurements, and whether each target is met.
 --
 -- It reads the rounds: lines of a name, a tab and a number. A line of a name, a tab and
--- anything else says why there are no measurements whose names begin so. It shows the
--- table; and with @keep FILE@ it writes down the ratios, with @check FILE@ it tells which
--- of them have become worse by more than a third.
+-- anything else gives the reason why there are no measurements with that prefix. It prints the
+-- table; with @keep FILE@ it also writes the ratios to the file, with @check FILE@ it lists those
+-- that have become worse by more than a third.
 --
--- A machine's mood may last for some rounds, and meet only one of two. What has become slower
--- is so by the medians, by the shortest rounds, and by itself, beside nothing else. (So keep
--- the ratios anew on a machine that is much faster.)
+-- Noise may last for some rounds, and affect only one of two programs. So a case counts as slower
+-- only if it is so by the medians, by the shortest rounds, and by our own time alone. (So keep the
+-- ratios again on a machine that is much faster.)
 module Main (main) where
 
 import Data.Either (fromLeft)
@@ -28,8 +28,8 @@ import Row
 
 main :: IO ()
 main = do
-  measured <- heard . lines <$> getContents
-  putStrLn (spread ["", "ours", "", "theirs", "ratio", "target", ""])
+  measured <- parse . lines <$> getContents
+  putStrLn (spread ["", "ours", "", "compared with", "ratio", "target", ""])
   for_ promises $ \group -> do
     putStrLn ("\n-- " ++ heading group ++ " (" ++ options group ++ ")")
     mapM_ (putStrLn . spread . cells measured) (rows group)
@@ -41,40 +41,40 @@ main = do
 
 -- What was measured.
 
--- | The rounds of each measurement, and whose measurements there are not, and why.
-data Heard = Heard (Map.Map String [Double]) [(String, String)]
+-- | The rounds of each measurement; and prefixes of missing measurements, with the reason.
+data Measurements = Measurements (Map.Map String [Double]) [(String, String)]
 
-heard :: [String] -> Heard
-heard report =
-  Heard
-    (Map.fromListWith (++) [(name, [number]) | (name, Right number) <- said])
-    [(name, why) | (name, Left why) <- said]
+parse :: [String] -> Measurements
+parse report =
+  Measurements
+    (Map.fromListWith (++) [(name, [number]) | (name, Right number) <- entries])
+    [(name, why) | (name, Left why) <- entries]
  where
-  said = map (fmap (meaning . drop 1) . break (== '\t')) report
+  entries = map (fmap (meaning . drop 1) . break (== '\t')) report
   meaning text = maybe (Left text) Right (readMaybe text)
 
 -- | Its rounds, or why there are none.
-roundsOf :: Heard -> Figure -> Either String (Figure, [Double])
-roundsOf (Heard rounds absences) figure = case Map.lookup (named figure) rounds of
+roundsOf :: Measurements -> Figure -> Either String (Figure, [Double])
+roundsOf (Measurements rounds absences) figure = case Map.lookup (named figure) rounds of
   Just numbers -> Right (figure, numbers)
   Nothing -> Left (maybe "absent: not measured" snd (find ((`isPrefixOf` named figure) . fst) absences))
 
-valueOf :: Heard -> Figure -> Either String Double
-valueOf measured figure = uncurry comesTo <$> roundsOf measured figure
+valueOf :: Measurements -> Figure -> Either String Double
+valueOf measured figure = uncurry summarise <$> roundsOf measured figure
 
-ratioOf :: Heard -> Figure -> Figure -> Either String Double
+ratioOf :: Measurements -> Figure -> Figure -> Either String Double
 ratioOf measured mine theirs = over <$> roundsOf measured mine <*> roundsOf measured theirs
 
 -- The table.
 
-cells :: Heard -> Row -> [String]
-cells measured (Row mine promise) =
-  [label mine, shown value] ++ case promise of
+cells :: Measurements -> Row -> [String]
+cells measured (Row mine bounds) =
+  [label mine, shown value] ++ case bounds of
     Times bound theirs -> than theirs ++ ["<= " ++ significant bound, verdict (<= bound) (ratioOf measured mine theirs)]
     Beside theirs -> than theirs ++ ["", fromLeft "" (ratioOf measured mine theirs)]
     AtMost bound -> ["", "", "", "<= " ++ significant bound, verdict (<= bound) value]
     AtLeast bound -> ["", "", "", ">= " ++ significant bound, verdict (>= bound) value]
-    NoPromise -> ["", "", "", "", fromLeft "" value]
+    NoTarget -> ["", "", "", "", fromLeft "" value]
  where
   value = valueOf measured mine
   than theirs = [label theirs, shown (valueOf measured theirs), shown (ratioOf measured mine theirs)]
@@ -86,9 +86,9 @@ label figure
   | fold figure == 1 = named figure
   | otherwise = show (round (fold figure) :: Int) ++ " x " ++ named figure
 
--- | In columns: words to the left, numbers to the right.
+-- | In columns: words aligned to the left, numbers to the right.
 spread :: [String] -> String
-spread = unwords . zipWith ($) [left 40, right 10, left 40, right 10, right 10, right 11, id]
+spread = unwords . zipWith ($) [left 40, right 10, left 40, right 13, right 10, right 11, id]
  where
   left n text = text ++ replicate (n - length text) ' '
   right n text = replicate (n - length text) ' ' ++ text
@@ -99,14 +99,14 @@ significant number = showFFloat (Just (if number == 0 then 0 else max 0 (2 - mag
  where
   magnitude = floor (logBase 10 (abs number))
 
--- The ratios that are kept, a line for each.
+-- The file of kept ratios, with a line for each.
 
 type Pair = (String, String)
 
--- | That in the table, that of the shortest rounds, and the shortest round of ours.
+-- | The ratio in the table, the ratio of the shortest rounds, and the shortest round of ours.
 type Ratios = [Double]
 
-ratiosOf :: Heard -> Map.Map Pair Ratios
+ratiosOf :: Measurements -> Map.Map Pair Ratios
 ratiosOf measured =
   Map.fromList
     [ (pairOf mine theirs, ratios)
@@ -132,7 +132,7 @@ kept file = Map.fromList . map (entry . split) . lines <$> readFile' file
   entry (mine : theirs : numbers) | Just ratios@[_, _, _] <- traverse readMaybe numbers = ((mine, theirs), ratios)
   entry other = error (file ++ ": not two names and three numbers: " ++ show other)
 
--- | In the order of the table. What was not measured this time stays as it was.
+-- | In the order of the table. Ratios that were not measured this time are not changed.
 keep :: FilePath -> Map.Map Pair Ratios -> IO ()
 keep file ratios = do
   before <- kept file
@@ -145,18 +145,18 @@ keep file ratios = do
 check :: FilePath -> Map.Map Pair Ratios -> IO ()
 check file ratios = do
   before <- kept file
-  putStrLn ("\n-- Beside the ratios in " ++ file)
+  putStrLn ("\n-- Compared with the ratios in " ++ file)
   for_ (Map.toList (before Map.\\ ratios)) $ \(pair, _) -> putStrLn (both pair ++ ": not measured")
   let worse = Map.filter (uncurry exceed) (Map.intersectionWith (,) ratios before)
-      (slower, moods) = Map.partition (and . uncurry (zipWith exceeds)) worse
-  told' moods "not in its shortest round, or only because theirs is faster"
-  told' slower "SLOWER"
+      (slower, noise) = Map.partition (and . uncurry (zipWith exceeds)) worse
+  list noise "not in its shortest round, or only because theirs is faster"
+  list slower "SLOWER"
   if null slower then putStrLn "none is slower by more than a third" else exitFailure
  where
   both (mine, theirs) = mine ++ " / " ++ theirs
-  told' found how =
+  list found verdict' =
     for_ (Map.toList found) $ \(pair, (are, were)) ->
-      putStrLn (both pair ++ ": " ++ inTable are ++ " where it was " ++ inTable were ++ ": " ++ how)
+      putStrLn (both pair ++ ": " ++ inTable are ++ ", before " ++ inTable were ++ ": " ++ verdict')
   inTable = concatMap significant . take 1
   exceed are were = or (take 1 (zipWith exceeds are were))
   ratio `exceeds` was = ratio > was * 4 / 3

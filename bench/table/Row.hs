@@ -1,5 +1,5 @@
 -- |
--- The words of which the rows of the table are made.
+-- The vocabulary for the rows of the table.
 module Row
   ( Group (..)
   , Row (..)
@@ -9,7 +9,7 @@ module Row
     -- * Figures
   , shortest
   , scaled
-  , comesTo
+  , summarise
   , over
 
     -- * Targets
@@ -17,7 +17,7 @@ module Row
   , times
   , atMost
   , atLeast
-  , told
+  , noTarget
   , beside
 
     -- * Units
@@ -28,7 +28,7 @@ module Row
 import Data.List (sort)
 import Data.String (IsString (..))
 
--- | Rows of one unit, from programs with these options of the runtime.
+-- | Rows of one unit, from programs that ran with these runtime options.
 data Group = Group
   { heading :: String
   , options :: String
@@ -40,7 +40,7 @@ data Row = Row
   , target :: Target
   }
 
--- | A measurement by its name: what its rounds come to, and how many of it.
+-- | A measurement: its name, how its rounds are summarised, and a factor.
 data Figure = Figure
   { summary :: Summary
   , fold :: Double
@@ -50,35 +50,35 @@ data Figure = Figure
 data Summary = Median | Shortest
 
 data Target
-  = -- | Ours is at most so many times theirs.
+  = -- | Ours is at most the given number of times theirs.
     Times Double Figure
-  | -- | How many times theirs it is, is told.
+  | -- | The ratio to theirs is shown.
     Beside Figure
   | AtMost Double
   | AtLeast Double
-  | NoPromise
+  | NoTarget
 
 -- | A name alone is the median of its rounds.
 instance IsString Figure where
   fromString = Figure Median 1
 
--- | What its rounds come to.
-comesTo :: Figure -> [Double] -> Double
-comesTo figure rounds = case summary figure of
+-- | The summary of its rounds.
+summarise :: Figure -> [Double] -> Double
+summarise figure rounds = case summary figure of
   Median -> fold figure * median rounds
   Shortest -> fold figure * minimum rounds
 
--- | How many times theirs ours is.
+-- | The ratio of ours to theirs.
 --
--- By medians, that is the median of what it is in each turn: a mood of the machine that lasts
--- for some turns meets both. (If one had more rounds than the other, several of them together
--- were its turn.)
+-- For medians, it is the median of the ratios of the single turns: noise that lasts for some
+-- turns affects both. (If one of them had more rounds than the other, several of its rounds
+-- count as one turn.)
 over :: (Figure, [Double]) -> (Figure, [Double]) -> Double
 over (mine, ours') (theirs, theirs') = case (summary mine, summary theirs) of
   (Median, Median) -> median (zipWith quotient (inTurns ours') (inTurns theirs'))
   _ -> quotient ours' theirs'
  where
-  quotient a b = let (x, y) = (comesTo mine a, comesTo theirs b) in if x == y then 1 else x / y
+  quotient a b = let (x, y) = (summarise mine a, summarise theirs b) in if x == y then 1 else x / y
   turns = min (length ours') (length theirs')
   inTurns rounds = [take (end - begin) (drop begin rounds) | (begin, end) <- zip bounds (drop 1 bounds)]
    where
@@ -87,11 +87,11 @@ over (mine, ours') (theirs, theirs') = case (summary mine, summary theirs) of
 median :: [Double] -> Double
 median rounds = sort rounds !! (length rounds `div` 2)
 
--- | Its shortest round, where the differences are smaller than the machine's moods.
+-- | Its shortest round: for differences that are smaller than the noise.
 shortest :: Figure -> Figure
 shortest figure = figure {summary = Shortest}
 
--- | So many times a figure.
+-- | A multiple of a figure.
 scaled :: Double -> Figure -> Figure
 scaled n figure = figure {fold = n * fold figure}
 
@@ -111,11 +111,11 @@ figure `atLeast` bound = Row figure (AtLeast bound)
 
 infix 1 `atMost`, `atLeast`
 
--- | To be told, with nothing promised.
-told :: Figure -> Row
-told figure = Row figure NoPromise
+-- | Shown without a target.
+noTarget :: Figure -> Row
+noTarget figure = Row figure NoTarget
 
--- | To be told, beside another, with nothing promised.
+-- | Shown with the ratio to another figure, without a target.
 beside :: Figure -> Figure -> Row
 figure `beside` other = Row figure (Beside other)
 

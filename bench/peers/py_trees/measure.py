@@ -13,7 +13,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 
-# A sequence or a fallback has so many actions.
+# The number of actions of a sequence or a fallback.
 LENGTH = 100_000
 
 
@@ -34,7 +34,7 @@ class Leaf(Behaviour):
 
 
 class Act(Leaf):
-    """An action: how it gets on, or how it ended, the world tells."""
+    """An action, whose status is a field of the world."""
 
     def update(self):
         return self.world.outcome
@@ -73,7 +73,7 @@ def condition(truth):
 
 
 def agent():
-    """The robot of the paper's section 6: it opens the front door, for ever.
+    """The robot of the paper's section 6: it opens the front door, which never ends.
 
     Of its 18 nodes a tick visits eight.
     """
@@ -103,13 +103,13 @@ def agent():
         act("do the task"),
     )
     care = in_turn(BatteryLow("low", world), Recharge("recharge", world))
-    # Without memory, so that each tick asks the battery; the mission keeps its
-    # own, and loses it when the battery is low.
+    # Without memory, so that each tick reads the battery; the mission has its
+    # own memory, and loses it when the battery is low.
     return Selector("monitor", memory=False, children=[care, mission])
 
 
 def rules(n):
-    """Rules of which the first that holds runs: the last one, for ever."""
+    """The first rule that holds runs: the last one, which never ends."""
     world = World(conditions=[i == n - 1 for i in range(n)])
 
     def rule(i):
@@ -128,7 +128,7 @@ def report(name, value):
 
 
 def nanoseconds(work):
-    """How long a call takes, by as many as take a fifth of a second."""
+    """Nanoseconds per call, measured over a fifth of a second or more."""
     calls = 1
     while True:
         begun = time.perf_counter_ns()
@@ -143,7 +143,7 @@ def nanoseconds(work):
 def processor_at_10_hz(work):
     """Processor seconds per second, over two seconds.
 
-    Near 1 it cannot keep up.
+    A value near 1 means that it cannot keep up.
     """
     used, begun = time.process_time(), time.monotonic()
     for period in range(1, 21):
@@ -164,7 +164,7 @@ def tick(root, expected=Status.RUNNING):
 
 
 def flat(name, composite, outcome):
-    """The one tick of a fresh tree: unlike bonsai-bt, it needs no reset."""
+    """One tick of a new tree. Unlike in bonsai-bt, no reset is needed."""
     world = World(outcome)
     children = [Act("act", world) for _ in range(LENGTH)]
     root = composite("flat", memory=True, children=children)
@@ -174,7 +174,7 @@ def flat(name, composite, outcome):
 
 
 def fleet(n):
-    """Many robots, each with a tree and a world of its own."""
+    """Many robots, each with its own tree and world."""
     gc.collect()
     before, begun = resident(), time.perf_counter_ns()
     agents = [agent() for _ in range(n)]

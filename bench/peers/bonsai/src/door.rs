@@ -1,4 +1,4 @@
-//! The robot that enters a room by one of two doors and minds its battery (section 6 of
+//! The robot that enters a room by one of two doors and watches its battery (section 6 of
 //! the paper), with the nodes of bonsai-bt.
 
 use bonsai_bt::{
@@ -32,19 +32,19 @@ pub enum Leaf {
 pub struct World {
     battery: f64,
     doorways: [Doorway; 2],
-    /// How the task gets on, or how it ended.
+    /// The status of the task.
     task: Status,
 }
 
 struct Doorway {
     open: bool,
-    /// How what the robot does there gets on, or how it ended.
+    /// The status of what the robot does there.
     progress: Status,
 }
 
 pub type Agent = BT<Leaf, World>;
 
-/// A robot that has just begun to open the front door, and will be at it for ever.
+/// A robot that has just begun to open the front door, which never ends.
 pub fn agent() -> Agent {
     let doorway = || Doorway {
         open: false,
@@ -60,8 +60,8 @@ pub fn agent() -> Agent {
 
 /// Of its 21 nodes a tick visits eight.
 ///
-/// A `Race` that the battery wins forgets how far the mission had come, as the paper's
-/// monitor does; `Select` and `Sequence` without memory would forget it at every tick.
+/// When the battery wins the `Race`, the mission begins again later, as with the paper's monitor;
+/// with `Select` and `Sequence` without memory it would begin again at every tick.
 fn monitored() -> Behavior<Leaf> {
     WhileAll(
         Box::new(Action(TaskUndone)),

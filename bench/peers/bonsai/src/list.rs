@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 #[derive(Clone, Copy)]
 pub enum Leaf {
-    /// Whether that condition holds.
+    /// Whether the condition with this number holds.
     Holds(usize),
     Act,
 }
@@ -39,8 +39,8 @@ pub fn fallback(n: usize) -> Tree {
     tree(Select(vec![Action(Leaf::Act); n]), vec![], Failure)
 }
 
-/// Rules of which the first that holds runs. Only the last holds; its action takes for
-/// ever. Without memory, so that each tick asks them all.
+/// The first rule that holds runs. Only the last one holds; its action never ends. Without
+/// memory, so that each tick evaluates all of them.
 pub fn rules(n: usize) -> Tree {
     let rule = |i| Sequence(vec![Action(Leaf::Holds(i)), Action(Leaf::Act)]);
     let list = Select((0..n).map(rule).collect()).memory(false);

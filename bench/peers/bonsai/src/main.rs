@@ -10,7 +10,7 @@ mod measure;
 use bonsai_bt::{Event, Failure, Running, Success, UpdateArgs};
 use std::{env, process::exit, time::Instant};
 
-/// A sequence or a fallback has so many actions.
+/// The number of actions of a sequence or a fallback.
 const LENGTH: usize = 100_000;
 
 fn main() {
@@ -40,7 +40,7 @@ fn report(name: &str, value: f64) {
     println!("bonsai {name}\t{value:.4}");
 }
 
-/// What a tree is told at each tick: that a tenth of a second has gone by.
+/// The event of each tick: a tenth of a second has passed.
 fn tenth_of_a_second() -> Event {
     UpdateArgs { dt: 0.1 }.into()
 }
@@ -52,7 +52,7 @@ fn tick() {
     report("door/battery tick", nanoseconds);
 }
 
-/// Each run of the whole, with the reset that a tree needs before it can run again.
+/// Runs the whole tree, with the reset that a tree needs before it can run again.
 fn sequence() {
     let (mut tree, event) = (list::sequence(LENGTH), tenth_of_a_second());
     let nanoseconds = measure::nanoseconds(|| {
@@ -62,7 +62,7 @@ fn sequence() {
     report("sequence step", nanoseconds / LENGTH as f64);
 }
 
-/// Each run of the whole, with its reset, too.
+/// Runs the whole tree, with its reset, too.
 fn fallback() {
     let (mut tree, event) = (list::fallback(LENGTH), tenth_of_a_second());
     let nanoseconds = measure::nanoseconds(|| {
@@ -79,7 +79,7 @@ fn rules(n: usize) {
     report(&format!("rules tick {n}"), nanoseconds);
 }
 
-/// Many robots, each with a door/battery tree and a world of its own.
+/// Many robots, each with its own door/battery tree and world.
 fn fleet(n: usize) {
     let each = |value: f64| value / n as f64;
     let (resident, begun) = (measure::resident(), Instant::now());
