@@ -44,7 +44,7 @@ goingWrong = do
         notes entries `shouldReturn` ["main is over", "over"]
 
   for_ faulty $ \(manner, e) ->
-    it (manner ++ " as the first one: nothing starts") $ do
+    it (manner ++ " as the first one prevents every branch from starting") $ do
       entries <- newLog
       ending (Signal.rSelect (Signal.polling 0.001 (throwIO e)) (note entries "l") (note entries "r"))
         `shouldReturn` endingOf (Left e)
@@ -104,7 +104,7 @@ goingWrong = do
     notes entries `shouldReturn` ["branch is over", "reading is over", "operator is over"]
 
   for_ ["reading", "branch"] $ \uninterruptible ->
-    it ("is stopped together with the branch: both are requested to stop at once, though the " ++ uninterruptible ++ " is uninterruptible") $ do
+    it ("is stopped together with the branch: both stop requests are made at once, though the " ++ uninterruptible ++ " is uninterruptible") $ do
       started <- newGate
       readingEntered <- newGate
       received <- newGate

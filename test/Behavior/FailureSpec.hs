@@ -103,7 +103,7 @@ fallbacks = do
         (\entries -> fallback (play entries a) (play entries b))
 
   it "binds tighter than >>" $ do
-    -- pure () ? (left >> right) would note nothing.
+    -- pure () ? (left >> right) would add no entry.
     observing (\entries -> pure () ? note entries 'l' >> note entries 'r')
       `shouldReturn` (Gave (), "r")
 

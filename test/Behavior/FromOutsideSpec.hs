@@ -110,7 +110,7 @@ usersCode = do
       (Signal.watching (readTVar level))
       (atomically (writeTVar level (Key 1)))
       (FaultedWith (show (Fault "equality")))
-  it "firstOf, allOf: of a list that ends in an error, the started branches have ended when it is thrown" $ do
+  it "firstOf, allOf: when the list of behaviours ends in an error, the started branches end before it is thrown" $ do
     entries <- newLog
     for_ [firstOf, void . allOf] $ \operator -> do
       entered <- newGate
@@ -169,7 +169,7 @@ undefinedExceptions = do
         awaitEnd caller
       end `shouldBe` (FaultedWith (show (Fault "undefined")) :: Ending ())
       notes entries `shouldReturn` ["recovered"]
-  it "of which another undefined exception is made: ends as a fault too" $
+  it "made of other undefined exceptions: ends as a fault too" $
     for_ (take 3 (iterate throw (throw (Fault "undefined") :: SomeException))) $ \bottom ->
       beside (throwIO bottom) parallel
  where

@@ -85,7 +85,7 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
       let act = leavingNothing (running op (pure True) hang hang)
       cancelling act (pure ()) `shouldReturn` CancelledBy (show (Cancel "the caller"))
 
-  it "does not read its condition again while the variables of that do not change" $ do
+  it "does not read its condition again while the condition's variables do not change" $ do
     condition <- newRecorded True
     other <- newTVarIO (0 :: Int)
     entered <- newGate
@@ -103,7 +103,7 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
         "whileHolding" -> (FailedWith "FailedBecause \"the condition does not hold\"", ["main"])
         "monitor" -> (Gave "main again", ["main", show level, "main again"])
         _ -> (Gave (show level), ["main", show level])
-    it ("nested in itself three times, throws the fault that level " ++ show level ++ " throws as it is stopped") $ do
+    it ("nested in itself three times, throws the branch's fault when level " ++ show level ++ " is stopped") $ do
       (end, ran) <- nested op level (throwIO (Fault "main"))
       end `shouldBe` FaultedWith (show (Fault "main"))
       ran `shouldBe` "main" : [show level | operator op == "monitor"]

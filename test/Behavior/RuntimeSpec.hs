@@ -105,7 +105,7 @@ interrupting = do
     end <- atomically (threadEnd thread)
     endingOf end `shouldBe` Gave 'a'
 
-  it "by throwToAll does not wait" $ do
+  it "has a variant, throwToAll, that does not wait" $ do
     inside <- newGate
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
@@ -160,7 +160,7 @@ waiting = do
         throwTo (asyncThreadId caller) (Cancel "caller")
         awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "caller")) :: Ending ())
 
-  it "awaitUninterruptibly cannot" $ do
+  it "cannot be interrupted inside awaitUninterruptibly" $ do
     var <- newTVarIO False
     withThread (awaitUninterruptibly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $ \caller -> do
       awaitIdle (asyncThreadId caller)

@@ -77,7 +77,7 @@ spec = guarded $ do
     end `shouldBe` (FailedWith (show (FailedBecause "forked")) :: Ending ())
     done `shouldMatchList` ["other", "scoped"]
 
-  it "throws the fault of the scoped behaviour rather than one of the forked, and of these the first forked one's" $ do
+  it "prefers the fault of the scoped behaviour to those of forked ones, and that of an earlier fork to a later one's" $ do
     let faulty gate name' = (open gate >> hang) `onException` throwIO (Fault name') :: IO ()
         faults theirs own = do
           inside <- newGate

@@ -35,11 +35,11 @@ watchingIt = do
       set condition NoValue
       awaitEnd caller `shouldReturn` lost
 
-  it "is not affected when the value is gone for a moment that no transaction can read" $ do
+  it "is not affected when one transaction removes and restores the value" $ do
     condition <- newTestCondition True
     entered <- newGate
     let branch = open entered >> atomically (readTVar condition >>= check . (== Value False)) >> hang
-        -- One transaction removes and restores the value: no other can read in between.
+        -- No other transaction can read in between.
         flicker = atomically (writeTVar condition NoValue >> writeTVar condition (Value True))
     withThread (Signal.rSelect (watched condition) branch (pure "right")) $ \caller -> do
       pass entered
@@ -52,7 +52,7 @@ watchingIt = do
 
 several :: Spec
 several = do
-  prop "that are pure is the function applied to their values" $ \f x y ->
+  prop "pure ones is the function applied to their values" $ \f x y ->
     let g = if f then (+) else (-) :: Int -> Int -> Int
         constant = pure :: Int -> Signal.Signal Int
      in ioProperty $ (=== g x y) <$> Signal.switch (g <$> constant x <*> constant y) pure

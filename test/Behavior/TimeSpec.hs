@@ -127,7 +127,7 @@ timeouts = do
     observing (\entries -> timeout 0 (note entries 'a'))
       `shouldReturn` (FailedWith (show (TimedOut 0)), "")
 
-  it "does not start the behaviour without time under any schedule" . void . explore (randomly 100) $ \simulated -> do
+  it "does not start the behaviour when there is no time at all, under any schedule" . void . explore (randomly 100) $ \simulated -> do
     entries <- newLog
     _ <- simulated (timeout 0 (note entries 'a'))
     notes entries `shouldReturn` ""
@@ -164,11 +164,11 @@ timeouts = do
     System.timeout 1000 (timeout 3600 hang ? pure 'b') `shouldReturn` Nothing
     timeout 0.001 (System.timeout 3600000000 hang) `shouldThrow` (== TimedOut 0.001)
 
-  it "measures from when it is run, each time" $ do
+  it "measures its time from when it is run, each time" $ do
     let limited = timeout 0.001
     virtually ((limited hang ? pure ()) >> limited (pure 'a')) `shouldReturn` 'a'
 
-  it "measures from when it is called, however late its clock starts" $
+  it "measures its time from the call, however late its clock starts" $
     eventually $ do
       begun <- now
       let timeIsUp = (>= begun + 0.02) <$> now

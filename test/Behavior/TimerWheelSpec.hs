@@ -117,7 +117,7 @@ sleeps = do
         awaitEnd other `shouldReturn` Gave ()
         pure (woken < t + 0.1)
 
-  it "can be interrupted: it ends at once, and the others until the same time end at that time" $ do
+  it "can be interrupted: it ends at once, and other sleeps until the same time still end" $ do
     t <- getMonotonicTime
     let to = t + 0.05
     sleeping <- replicateM 5 (async (sleepBetween t to >> getMonotonicTime))
