@@ -17,13 +17,13 @@ import GHC.Stats
 import System.Mem (performMajorGC)
 import Test.Hspec
 
--- | Gives the action what it is to call at each of so many steps, and compares
--- what is live at a tenth of them with what is live at the last: that is less than a
--- megabyte more.
+-- | Passes to the action a callback that it runs at each of the given number of steps.
+-- At the last step less than a megabyte more must be live than after a tenth of the
+-- steps.
 inConstantMemory :: Int -> (IO () -> IO ()) -> Expectation
 inConstantMemory = growingByLessThan 1000000
 
--- | The same, for so many bytes.
+-- | Like 'inConstantMemory', with the given number of bytes as the limit.
 growingByLessThan :: Int64 -> Int -> (IO () -> IO ()) -> Expectation
 growingByLessThan bytes steps act = do
   getRTSStatsEnabled `shouldReturn` True
@@ -37,9 +37,9 @@ growingByLessThan bytes steps act = do
   measured <- (,) <$> readIORef early <*> readIORef late
   case measured of
     (Just atFirst, Just atLast) -> atLast - atFirst `shouldSatisfy` (< bytes)
-    _ -> expectationFailure "there were fewer steps than it should have made"
+    _ -> expectationFailure "there were fewer steps than expected"
 
--- | What is live after a major garbage collection.
+-- | The number of bytes that are live after a major garbage collection.
 liveBytes :: IO Int64
 liveBytes = do
   performMajorGC

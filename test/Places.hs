@@ -1,6 +1,6 @@
 -- |
--- All the places where an operator runs a behaviour: what is promised of every
--- operator is tried in each of them.
+-- All the places where an operator runs a behaviour. The promises of every operator
+-- are tested in each of them.
 module Places
   ( Place (..)
   , places
@@ -20,12 +20,12 @@ import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically, timeout)
 import Support
 
--- | A place in an operator. All else in the operator does nothing: when the
--- behaviour in this place ends, the operator ends alike.
+-- | A place in an operator. All other branches of the operator do nothing: when the
+-- behaviour in this place ends, the operator ends in the same way.
 data Place = Place
   { placeName :: String
   , placeLabel :: Maybe Label
-  -- ^ Of the thread that the behaviour runs in, if it is not the caller's.
+  -- ^ The label of the thread that runs the behaviour, if it is not the caller's.
   , placed :: Behavior () -> Behavior ()
   }
 
@@ -81,7 +81,7 @@ places =
   noException :: SomeException -> Bool
   noException _ = False
 
--- | What a behaviour fails with that is tried in a place: there the second of '?',
--- which runs when the first has failed, fails with it too.
+-- | The failure of a behaviour that fails in its place. In the first place of '?' the
+-- second behaviour then runs; it fails with this failure too.
 theFailure :: Failure
 theFailure = Failure "in its place"

@@ -1,12 +1,12 @@
 -- |
--- Tries the promises and the specification for as long as it is told, ever new programs
--- under ever new schedules, and says what it covered.
+-- Tests the promises and the specification for the given number of seconds, each round
+-- with new programs and new schedules, and prints what was covered.
 --
 -- > soak 600
 --
--- It begins with all that is asked of a release, however long that takes: a hundred
--- thousand random schedules of each promise, and as many random programs compared with the
--- specification. Without a number of seconds it ends with that.
+-- The first round is what a release requires, however long it takes: a hundred thousand
+-- random schedules of each promise, and as many random programs compared with the
+-- specification. Without a number of seconds only the first round is run.
 module Main (main) where
 
 import Control.Monad (forM, forM_, unless, when)
@@ -33,14 +33,14 @@ main = do
   seconds <- case map reads arguments of
     [] -> pure 0
     [[(n, "")]] | n >= 0 -> pure (n :: Double)
-    _ -> die "soak: the argument is how many seconds it should take, 600 say"
+    _ -> die "soak: the argument is the number of seconds to run, for example 600"
   let rounds n total = do
         tried <- oneRound n
         spent <- subtract begun <$> getMonotonicTime
         let covered = total <> tried
         putStrLn ("-- after " ++ show n ++ " rounds and " ++ secs spent ++ ": " ++ show covered)
         when (spent < seconds) (rounds (n + 1) covered)
-  putStrLn "-- broken operators: after so many schedules, on average of 20 seeds, one is rejected"
+  putStrLn "-- broken operators: the number of schedules until each is rejected, on average of 20 seeds"
   forM_ mutants reject
   rounds (1 :: Int) mempty
 
@@ -56,7 +56,7 @@ oneRound n = do
       <* timed "in reality, 500 programs" (inReality (1 + 500 * (n - 1)) 500 sound promise)
   putStrLn "The specification"
   checks "random programs, each run a path of the relation" 100000 onlyWhatIsAllowed
-  checks "small programs, both sets of outcomes the same" 500 allThatIsAllowed
+  checks "small programs, both sets of outcomes equal" 500 allThatIsAllowed
   pure (mconcat promised')
 
 checks :: String -> Int -> Property -> IO ()
@@ -78,12 +78,12 @@ timed name act = do
 secs :: Double -> String
 secs t = showFFloat (Just 1) t " s"
 
--- | How soon a broken operator is noticed.
+-- | Prints after how many schedules a broken operator is rejected.
 reject :: Mutant -> IO ()
 reject mutant = do
   numbers <- catMaybes <$> traverse (\seed -> firstRejection 20000 seed (spoken mutant) (breaks mutant)) [1 .. 20]
   let mean = sum numbers `div` max 1 (length numbers)
   putStrLn ("  " ++ padded (show mean) ++ "  " ++ what mutant ++ " (" ++ promised (breaks mutant) ++ ")")
-  unless (length numbers == 20) $ putStrLn "not noticed by every seed" >> exitFailure
+  unless (length numbers == 20) $ putStrLn "not rejected with every seed" >> exitFailure
  where
   padded text = replicate (6 - length text) ' ' ++ text

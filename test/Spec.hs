@@ -74,7 +74,7 @@ main = hspec $ do
     Behavior.FromOutsideSpec.spec
     Behavior.ThrowingCleanupSpec.spec
   describe "Promises" Behavior.PromisesSpec.spec
-  describe "Storms" Behavior.CancellationStressSpec.spec
+  describe "Cancellation stress" Behavior.CancellationStressSpec.spec
   describe "Space" $ do
     Behavior.SpaceSpec.spec
     Behavior.ReactiveSpaceSpec.spec

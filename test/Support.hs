@@ -1,12 +1,12 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- What all specs share: a watchdog, gates, a notebook, a caller who can be
--- cancelled, and a way to say how an action ended.
+-- What all specs share: a watchdog, gates, a log, a caller that can be cancelled, and
+-- a type for how an action ended.
 --
--- Nothing here sleeps. What has to happen in a certain order is made to, by gates;
--- and where only the state of a thread tells ('awaitIdle', 'awaitOver'), that is
--- asked for again and again, until the watchdog barks.
+-- Nothing here sleeps. Where the order of events matters, gates force it. Where only
+-- the state of a thread shows it ('awaitIdle', 'awaitOver'), that state is read
+-- repeatedly, until the watchdog fails the example.
 module Support
   ( -- * Around every example
     guarded
@@ -23,14 +23,14 @@ module Support
   , untilOpen
   , hang
 
-    -- * The notebook
+    -- * The log
   , Log
   , newLog
   , note
   , notes
 
-    -- * A caller who can be cancelled
-  , launching
+    -- * A caller that can be cancelled
+  , withThread
   , cancelling
   , throwing
   , awaitThrown
@@ -79,21 +79,21 @@ import Behavior
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime (atomically, liveThreadCount)
 
--- | Every spec as a whole goes in here: each example must be over within twenty
--- seconds (of which it needs one at the most, unless the machine is very busy), and
--- must leave no thread of the library running.
+-- | Wraps every spec: each example must end within twenty seconds (it needs at most
+-- one, unless the machine is very busy), and must leave no thread of the library
+-- running.
 guarded :: Spec -> Spec
 guarded = around_ (within 20 . leavingNothing)
 
--- | Fails when the action takes more than so many (real) seconds, also when it
--- cannot be interrupted: then its thread is left behind.
+-- | Fails when the action takes more than the given number of (real) seconds, also
+-- when it cannot be interrupted: then its thread is left running.
 within :: Int -> IO a -> IO a
 within seconds act = do
   box <- newEmptyMVar
   thread <- mask_ (forkIOWithUnmask (\unmask -> try (unmask act) >>= putMVar box))
-  -- A strong reference would hide from GHC that everything is deadlocked.
-  weakly <- mkWeakThreadId thread
-  let abandon = deRefWeak weakly >>= traverse_ (forkIO . killThread)
+  -- With a strong reference GHC could not detect a deadlock of all threads.
+  weakThread <- mkWeakThreadId thread
+  let abandon = deRefWeak weakThread >>= traverse_ (forkIO . killThread)
   over <- timeout (seconds * 1000000) (takeMVar box) `onException` abandon
   case over of
     Just (Right a) -> pure a
@@ -103,8 +103,8 @@ within seconds act = do
       expectationFailure ("the watchdog: this was not over after " ++ show seconds ++ " s")
       throwIO (ErrorCall "unreachable")
 
--- | Checks that as many threads of the library live after the action, at the very
--- moment when it returns or throws, as lived before it.
+-- | Checks that as many threads of the library are alive at the moment when the action
+-- returns or throws as were alive before it.
 leavingNothing :: IO a -> IO a
 leavingNothing act = mask $ \restore -> do
   before <- liveThreadCount
@@ -114,7 +114,7 @@ leavingNothing act = mask $ \restore -> do
     show (after - before) ++ " threads were left running"
   either (\(e :: SomeException) -> throwIO e) pure end
 
--- | What one waits at until somebody opens it, for ever.
+-- | Blocks the threads that pass it until it is opened; it is never closed again.
 newtype Gate = Gate (TVar Bool)
 
 newGate :: IO Gate
@@ -134,22 +134,22 @@ pass = atomically . passed
 passed :: Gate -> STM ()
 passed (Gate state) = readTVar state >>= check
 
--- | Does it again and again until the gate is open.
+-- | Repeats the action until the gate is open.
 untilOpen :: Gate -> IO () -> IO ()
 untilOpen gate@(Gate state) act =
   readTVarIO state >>= \isOpen -> unless isOpen (act >> untilOpen gate act)
 
--- | Waits until it is interrupted.
+-- | Blocks until it is interrupted.
 hang :: IO a
 hang = atomically retry
 
--- | Who did what, in the order in which it happened.
+-- | The entries that the threads of an example add, in their order.
 newtype Log e = Log (TVar [e])
 
 newLog :: IO (Log e)
 newLog = Log <$> newTVarIO []
 
--- | Notes; it is never blocked, so it cannot be interrupted where exceptions are
+-- | Adds an entry. It never blocks, so it cannot be interrupted where exceptions are
 -- masked.
 note :: Log e -> e -> IO ()
 note (Log events) e = atomically (modifyTVar' events (e :))
@@ -157,35 +157,36 @@ note (Log events) e = atomically (modifyTVar' events (e :))
 notes :: Log e -> IO [e]
 notes (Log events) = reverse <$> readTVarIO events
 
--- | Runs an action in a thread of its own while the second one looks at it and
--- tampers with it; when that ends, the action is ended too.
-launching :: IO a -> (Async a -> IO b) -> IO b
-launching = withAsync
+-- | Runs the action in a thread of its own while the second action observes and
+-- interrupts it; when the second action ends, the first is cancelled.
+withThread :: IO a -> (Async a -> IO b) -> IO b
+withThread = withAsync
 
--- | Starts the caller, does what is to be done first, then cancels the caller, and
--- says how that one ended.
+-- | Runs the first action as a caller, in a thread of its own; runs the second action;
+-- then cancels the caller and returns how it ended.
 cancelling :: IO a -> IO () -> IO (Ending a)
-cancelling act first = launching act $ \caller -> do
+cancelling act first = withThread act $ \caller -> do
   first
   throwTo (asyncThreadId caller) (Cancel "the caller")
   awaitEnd caller
 
 -- | Throws an exception to the thread, from a thread of its own, and returns once
--- the exception was delivered or is waiting to be.
+-- the exception was received or is pending.
 throwing :: Exception e => ThreadId -> e -> IO ()
 throwing target e = do
   forkIO (throwTo target e) >>= awaitThrown
 
--- | Returns once what the thread throws, and then ends, was received or is pending.
+-- | Returns once the exception that this thread throws was received or is pending. (The
+-- thread ends when it has thrown it.)
 awaitThrown :: ThreadId -> IO ()
 awaitThrown thrower = do
   eventually $ (`elem` [ThreadBlocked BlockedOnException, ThreadFinished]) <$> threadStatus thrower
-  -- It may be under way yet, to another capability (and to one more, if the thread was
-  -- moved meanwhile).
+  -- The exception may still be on its way to another capability (and then to a further
+  -- one, if the thread was moved meanwhile).
   replicateM_ 2 readMessages
 
--- | Returns once each capability has read what was sent to it before: it does so before it
--- runs a thread that is sent later.
+-- | Returns once each capability has handled the messages that were sent to it before: it
+-- does so before it runs a thread that is sent later.
 readMessages :: IO ()
 readMessages = do
   capabilities <- getNumCapabilities
@@ -194,36 +195,36 @@ readMessages = do
 awaitEnd :: Async a -> IO (Ending a)
 awaitEnd caller = endingOf <$> waitCatch caller
 
--- | Fails when the action has ended. It looks when the thread is over or waits, so
--- that one which is about to end does not pass for one that goes on.
+-- | Fails when the action has ended. It checks this once the thread has ended or is
+-- blocked, so that a thread which is about to end does not count as running.
 stillRunning :: Async a -> IO ()
 stillRunning caller = do
   awaitIdle (asyncThreadId caller)
   over <- poll caller
   unless (isNothing over) $ expectationFailure "it has ended already"
 
--- | Returns once the thread waits (in a transaction, at an 'MVar', or for the time),
--- or is over.
+-- | Returns once the thread is blocked (in a transaction, at an 'MVar', or in a delay),
+-- or has ended.
 awaitIdle :: ThreadId -> IO ()
 awaitIdle thread = eventually $ (`elem` idle) <$> threadStatus thread
  where
   idle = map ThreadBlocked [BlockedOnSTM, BlockedOnMVar, BlockedOnOther] ++ [ThreadFinished, ThreadDied]
 
--- | Returns once the thread is over, so that whoever looks sees how it ended.
+-- | Returns once the thread has ended, so that its outcome is visible to other threads.
 awaitOver :: ThreadId -> IO ()
 awaitOver thread = eventually $ (`elem` [ThreadFinished, ThreadDied]) <$> threadStatus thread
 
--- | Asks again and again, and lets the others run meanwhile.
+-- | Repeats the check until it gives 'True', and yields in between.
 eventually :: IO Bool -> IO ()
-eventually question = question >>= \yes -> unless yes (yield >> eventually question)
+eventually holds = holds >>= \isTrue -> unless isTrue (yield >> eventually holds)
 
--- | How an action ended. Exceptions are told apart by their class and their text.
+-- | How an action ended. Exceptions are compared by their class and their text.
 data Ending a
   = Gave a
   | FailedWith String
   | FaultedWith String
   | CancelledBy String
-  | -- | Cancelled by the first, and the second is the fault met on the way.
+  | -- | Cancelled by the first exception; the second is the fault thrown while stopping.
     CancelledWithFault String String
   deriving (Eq, Ord, Show)
 
@@ -239,13 +240,13 @@ endingOf (Left e)
   | isFailure e = FailedWith (show e)
   | otherwise = FaultedWith (show e)
 
--- | Somebody's bug.
+-- | A bug in users' code.
 newtype Fault = Fault String
   deriving (Eq, Show)
 
 instance Exception Fault
 
--- | A failure of somebody's own type.
+-- | A failure of a user's own type.
 newtype Failure = Failure String
   deriving (Eq, Show)
 
@@ -261,12 +262,12 @@ instance Exception Cancel where
   toException = asyncExceptionToException
   fromException = asyncExceptionFromException
 
--- | Runs the action, and when it is interrupted the cleanup, which nothing can
--- interrupt, not even where it waits.
+-- | Runs the action and, when it is interrupted, the cleanup. Nothing can interrupt the
+-- cleanup, not even where it blocks.
 uninterruptibly :: IO a -> IO () -> IO a
 uninterruptibly act cleanup = act `onException` uninterruptibleMask_ cleanup
 
--- | A behaviour that notes its name, then ends.
+-- | A behaviour that adds its name to the log, then ends as given.
 data Script = Script String End
   deriving (Eq, Show)
 
@@ -274,7 +275,7 @@ data End
   = Succeeds Int
   | Fails String
   | Faults String
-  | -- | Throws a cancellation (as somebody's code may who caught one).
+  | -- | Throws a cancellation (as users' code may after it has caught one).
     Cancels String
   deriving (Eq, Show)
 
@@ -294,20 +295,20 @@ instance Arbitrary End where
   shrink _ = [Succeeds 0]
 
 play :: Log String -> Script -> IO Int
-play notebook (Script name end) = do
-  note notebook name
+play entries (Script name end) = do
+  note entries name
   case end of
     Succeeds n -> pure n
     Fails why -> throwIO (Failure why)
     Faults why -> throwIO (Fault why)
     Cancels why -> throwIO (Cancel why)
 
--- | Both behaviours end alike and do the same in the same order.
+-- | Both behaviours have equal endings and add the same entries in the same order.
 sameAs :: (Eq a, Show a) => (Log String -> IO a) -> (Log String -> IO a) -> Property
 sameAs one other = ioProperty ((===) <$> observing one <*> observing other)
 
--- | How an action ended, and what it noted.
+-- | How an action ended, and the entries that it added to the log.
 observing :: (Log e -> IO a) -> IO (Ending a, [e])
 observing act = do
-  notebook <- newLog
-  (,) <$> ending (act notebook) <*> notes notebook
+  entries <- newLog
+  (,) <$> ending (act entries) <*> notes entries

@@ -6,13 +6,13 @@
 -- how many run at once.
 module Watched
   ( -- * Conditions
-    Says (..)
+    ConditionState (..)
   , TestCondition
   , newTestCondition
   , set
-  , says
+  , readCondition
   , watched
-  , dialled
+  , watchedVar
 
     -- * Sensors
   , Sensor
@@ -23,16 +23,16 @@ module Watched
   , readingsBeyond
   , aWhile
 
-    -- * Who looks
+    -- * Recorded reads
   , Recorded (..)
   , newRecorded
-  , noticed
-  , hasNoticed
+  , awaitProcessed
+  , hasProcessed
 
     -- * Branches
   , Stopping (..)
   , onStop
-  , awaitUnheard
+  , awaitBlockedByThread
 
     -- * Gates
   , opened
@@ -62,40 +62,40 @@ import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Support
 
--- | What a condition says.
-data Says
-  = Says Bool
-  | SaysFailure
-  | SaysFault
-  | SaysNothing
+-- | The state of a condition.
+data ConditionState
+  = Value Bool
+  | SensorFailure
+  | SensorFault
+  | NoValue
   deriving (Eq, Show)
 
 -- | A condition that the test sets.
-type TestCondition = TVar Says
+type TestCondition = TVar ConditionState
 
 newTestCondition :: Bool -> IO TestCondition
-newTestCondition = newTVarIO . Says
+newTestCondition = newTVarIO . Value
 
-set :: TestCondition -> Says -> IO ()
+set :: TestCondition -> ConditionState -> IO ()
 set condition = atomically . writeTVar condition
 
-says :: TestCondition -> STM Bool
-says condition =
+readCondition :: TestCondition -> STM Bool
+readCondition condition =
   readTVar condition >>= \case
-    Says holds -> pure holds
-    SaysFailure -> failWith "the sensor"
-    SaysFault -> throwSTM (Fault "the sensor")
-    SaysNothing -> retry
+    Value holds -> pure holds
+    SensorFailure -> failWith "the sensor"
+    SensorFault -> throwSTM (Fault "the sensor")
+    NoValue -> retry
 
 watched :: TestCondition -> Signal Bool
-watched = Signal.watching . says
+watched = Signal.watching . readCondition
 
 -- | The signal of a plain variable.
-dialled :: TVar a -> Signal a
-dialled = Signal.watching . readTVar
+watchedVar :: TVar a -> Signal a
+watchedVar = Signal.watching . readTVar
 
--- | A sensor that counts its readings, and does what the test says for each of
--- them, by its number from 1.
+-- | A sensor that counts its readings. Its function gives what each reading does, by
+-- the reading's number from 1.
 data Sensor a = Sensor (TVar Int) (Int -> Behavior a)
 
 newSensor :: (Int -> Behavior a) -> IO (Sensor a)
@@ -106,7 +106,7 @@ sensor :: Sensor a -> Behavior a
 sensor (Sensor count act) =
   atomically (modifyTVar' count (+ 1) >> readTVar count) >>= act
 
--- | Asks the sensor every millisecond.
+-- | Polls the sensor every millisecond.
 sensing :: Sensor a -> Signal a
 sensing = Signal.polling 0.001 . sensor
 
@@ -114,25 +114,25 @@ sensing = Signal.polling 0.001 . sensor
 readings :: Sensor a -> IO Int
 readings (Sensor count _) = readTVarIO count
 
--- | Waits until so many more readings have begun.
+-- | Waits until the given number of further readings have begun.
 readingsBeyond :: Int -> Sensor a -> IO ()
 readingsBeyond more s@(Sensor count _) = do
   before <- readings s
   atomically (readTVar count >>= check . (>= before + more))
 
--- | As long as it takes a sensor of our own to be read twenty times, once in so
--- many seconds: time for something to happen that must not.
+-- | Waits while a sensor of its own is read twenty times, at the given period: time
+-- enough for an event that must not happen.
 aWhile :: Seconds -> Behavior ()
 aWhile every = do
   own <- newSensor (pure . (> 20))
   Signal.waitUntil (Signal.polling every (sensor own))
 
--- | A variable whose signal records who has looked at it.
+-- | A variable whose signal records which threads have read it.
 data Recorded a = Recorded
   { underlying :: TVar a
   , recorded :: Signal a
-  , looks :: (ThreadId -> Bool) -> a -> IO Int
-  -- ^ How often the threads that are meant have looked at it since it has this value.
+  , readCount :: (ThreadId -> Bool) -> a -> IO Int
+  -- ^ How often the threads of the given predicate have read it since it has this value.
   }
 
 newRecorded :: Eq a => a -> IO (Recorded a)
@@ -147,24 +147,24 @@ newRecorded initial = do
           unsafeIOToSTM $ do
             self <- myThreadId
             value <$ atomicModifyIORef' seen (\all' -> ((self, value) : all', ()))
-      , looks = \meant value ->
+      , readCount = \meant value ->
           length . takeWhile ((== value) . snd) . filter (meant . fst) <$> readIORef seen
       }
 
--- | Waits until a worker of the operator that the caller runs has seen the value and
--- done what there is to do: it looks for the second time.
-noticed :: Recorded a -> Async b -> a -> IO ()
-noticed var caller = eventually . hasNoticed var caller
+-- | Waits until a worker of the operator that the caller runs has read the value and
+-- processed it: the worker then reads it a second time.
+awaitProcessed :: Recorded a -> Async b -> a -> IO ()
+awaitProcessed var caller = eventually . hasProcessed var caller
 
-hasNoticed :: Recorded a -> Async b -> a -> IO Bool
-hasNoticed var caller value = (>= 2) <$> looks var (/= asyncThreadId caller) value
+hasProcessed :: Recorded a -> Async b -> a -> IO Bool
+hasProcessed var caller value = (>= 2) <$> readCount var (/= asyncThreadId caller) value
 
--- | What a branch does when it is asked to stop.
+-- | What a branch does when its stop is requested.
 data Stopping = Cleanly | Completing | Failing | Faulting
   deriving (Eq, Show, Enum, Bounded)
 
--- | Runs a branch, and when it is asked to stop does as it is told, with the given
--- name: it stops, completes with that name, or fails or faults saying it.
+-- | Runs a branch that does the given thing when its stop is requested: it stops,
+-- completes with the given name, or fails or faults with that name.
 onStop :: Stopping -> String -> Behavior String -> Behavior String
 onStop how name act =
   act `catch` \e -> case how of
@@ -173,22 +173,22 @@ onStop how name act =
     Failing -> throwIO (Failure name)
     Faulting -> throwIO (Fault name)
 
--- | Returns once the thread waits for another one: until that has received an exception, or
--- has ended.
-awaitUnheard :: ThreadId -> IO ()
-awaitUnheard thread = eventually ((`elem` map ThreadBlocked [BlockedOnException, BlockedOnSTM]) <$> threadStatus thread)
+-- | Returns once the thread is blocked by another one: until that one has received an
+-- exception, or has ended.
+awaitBlockedByThread :: ThreadId -> IO ()
+awaitBlockedByThread thread = eventually ((`elem` map ThreadBlocked [BlockedOnException, BlockedOnSTM]) <$> threadStatus thread)
 
 -- | Whether the gate is open.
 opened :: Gate -> IO Bool
 opened gate = atomically ((True <$ passed gate) `orElse` pure False)
 
--- | Where at most one may be at a time.
+-- | Counts how many branches are inside at the same time; at most one may be.
 data OccupancyCounter = OccupancyCounter (TVar Int) (TVar Int)
 
 newOccupancyCounter :: IO OccupancyCounter
 newOccupancyCounter = OccupancyCounter <$> newTVarIO 0 <*> newTVarIO 0
 
--- | Acts inside the room.
+-- | Runs the action inside.
 inside :: OccupancyCounter -> IO a -> IO a
 inside (OccupancyCounter now most) = bracket_ enter leave
  where
@@ -198,7 +198,7 @@ inside (OccupancyCounter now most) = bracket_ enter leave
     modifyTVar' most (max n)
   leave = atomically (modifyTVar' now (subtract 1))
 
--- | How many there have been at once, at most.
+-- | The largest number that were inside at the same time.
 mostInside :: OccupancyCounter -> IO Int
 mostInside (OccupancyCounter _ most) = readTVarIO most
 
@@ -207,13 +207,13 @@ data Operator = Operator
   { operator :: String
   , running :: Signal Bool -> Behavior String -> Behavior String -> Behavior String
   -- ^ The condition; what runs while it holds; what runs while it does not, if the
-  -- operator has such a thing.
+  -- operator has such a branch.
   }
 
 instance Show Operator where
   show = operator
 
--- | All that interrupt a branch. 'Signal.monitor' watches for the contrary.
+-- | All operators that interrupt a branch. 'Signal.monitor' gets the negated condition.
 operators :: [Operator]
 operators =
   [ Operator "rSelect" Signal.rSelect

@@ -1,8 +1,8 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Readings of a polled sensor that go wrong: that fail, hang, cannot be interrupted, or
--- make trouble when they are; and 'Signal.staleAfter'.
+-- Readings of a polled sensor that fail, hang, cannot be interrupted, or throw when they
+-- are interrupted; and 'Signal.staleAfter'.
 module Behavior.BadReadingSpec (spec) where
 
 import Control.Concurrent.Async (asyncThreadId)
@@ -32,25 +32,25 @@ goingWrong = do
   for_ operators $ \op ->
     for_ faulty $ \(manner, e) ->
       it (unwords [manner, "ends", show op, "after its branch"]) $ do
-        book <- newLog
+        entries <- newLog
         entered <- newGate
         level <- newSensor $ \_ -> opened entered >>= \isEntered -> if isEntered then throwIO e else pure True
         let main =
               (open entered >> hang) `onException` do
-                note book "main is over"
-            other = note book "other" >> pure "other"
-        ending (running op (sensing level) main other `onException` note book "over")
+                note entries "main is over"
+            other = note entries "other" >> pure "other"
+        ending (running op (sensing level) main other `onException` note entries "over")
           `shouldReturn` endingOf (Left e)
-        notes book `shouldReturn` ["main is over", "over"]
+        notes entries `shouldReturn` ["main is over", "over"]
 
   for_ faulty $ \(manner, e) ->
-    it (manner ++ " the first time starts nothing") $ do
-      book <- newLog
-      ending (Signal.rSelect (Signal.polling 0.001 (throwIO e)) (note book "l") (note book "r"))
+    it (manner ++ " as the first one prevents every branch from starting") $ do
+      entries <- newLog
+      ending (Signal.rSelect (Signal.polling 0.001 (throwIO e)) (note entries "l") (note entries "r"))
         `shouldReturn` endingOf (Left e)
-      notes book `shouldReturn` []
+      notes entries `shouldReturn` []
 
-  it "swallows the request to stop does not keep the operator from ending" $ do
+  it "catches its stop request and returns does not prevent the operator from ending" $ do
     entered <- newGate
     level <- newSensor $ \_ -> do
       open entered
@@ -81,8 +81,8 @@ goingWrong = do
         Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "reading"))
         _ -> CancelledBy (show (Cancel "the caller"))
 
-  it "cannot be interrupted has ended before its operator" $ do
-    book <- newLog
+  it "cannot be interrupted ends before its operator does" $ do
+    entries <- newLog
     started <- newGate
     entered <- newGate
     release <- newGate
@@ -91,37 +91,37 @@ goingWrong = do
       when isStarted . uninterruptibleMask_ $ do
         open entered
         pass release
-        note book "reading is over"
+        note entries "reading is over"
       pure True
     let act = do
-          Signal.rSelect (sensing level) (open started >> pass entered >> note book "branch is over") (pure ())
-          note book "operator is over"
-    launching act $ \caller -> do
-      eventually ((== ["branch is over"]) <$> notes book)
-      awaitUnheard (asyncThreadId caller)
+          Signal.rSelect (sensing level) (open started >> pass entered >> note entries "branch is over") (pure ())
+          note entries "operator is over"
+    withThread act $ \caller -> do
+      eventually ((== ["branch is over"]) <$> notes entries)
+      awaitBlockedByThread (asyncThreadId caller)
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["branch is over", "reading is over", "operator is over"]
+    notes entries `shouldReturn` ["branch is over", "reading is over", "operator is over"]
 
-  for_ ["reading", "branch"] $ \deaf ->
-    it ("has to stop hears it at once, with the branch, though the " ++ deaf ++ " is deaf") $ do
+  for_ ["reading", "branch"] $ \uninterruptible ->
+    it ("is stopped together with the branch: both stop requests are made at once, though the " ++ uninterruptible ++ " is uninterruptible") $ do
       started <- newGate
       readingEntered <- newGate
-      heard <- newGate
+      received <- newGate
       release <- newGate
       let being name entered
-            | name == deaf = uninterruptibleMask_ (open entered >> pass release)
-            | otherwise = (open entered >> hang) `onException` open heard
+            | name == uninterruptible = uninterruptibleMask_ (open entered >> pass release)
+            | otherwise = (open entered >> hang) `onException` open received
       level <- newSensor $ \_ -> do
         isStarted <- opened started
         when isStarted (being "reading" readingEntered)
         pure True
       let act = Signal.rSelect (sensing level) (being "branch" started) (pure ())
-      launching act $ \caller -> do
+      withThread act $ \caller -> do
         pass readingEntered
         throwing (asyncThreadId caller) (Cancel "the caller")
-        -- It is the other one that hears, while the deaf one still waits.
-        pass heard
+        -- The other one receives the stop request while the uninterruptible one still blocks.
+        pass received
         open release
         awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "the caller"))
  where
@@ -132,62 +132,62 @@ goingWrong = do
     ]
   manners how = case how of
     Cleanly -> "stops"
-    Completing -> "returns all the same"
-    Failing -> "fails: which nobody minds"
-    Faulting -> "faults: which gets out"
+    Completing -> "nevertheless returns"
+    Failing -> "fails: the failure is ignored"
+    Faulting -> "faults: the fault is thrown"
 
 stale :: Spec
 stale = do
   for_ operators $ \op ->
     it ("makes " ++ show op ++ " fail when a reading takes longer, after its branch has ended") $ do
-      book <- newLog
+      entries <- newLog
       started <- newGate
       level <- newSensor $ \_ -> opened started >>= \isStarted -> if isStarted then hang else pure True
-      let main = (open started >> hang) `onException` note book "main is over"
-          other = note book "other" >> pure "other"
+      let main = (open started >> hang) `onException` note entries "main is over"
+          other = note entries "other" >> pure "other"
           signal = Signal.staleAfter 0.005 (sensing level)
       since <- now
       ending (running op signal main other) `shouldReturn` FailedWith (tooLong "0.005")
       over <- now
       over - since `shouldSatisfy` (>= 0.005)
-      -- (Should the machine take longer than that for a reading which does nothing, then
-      -- there was no branch.)
+      -- (If the machine took longer than that for a reading which does nothing, no branch
+      -- was started.)
       ran <- opened started
-      notes book `shouldReturn` ["main is over" | ran]
+      notes entries `shouldReturn` ["main is over" | ran]
 
   it "fails when there is not even a first reading" $ do
-    book <- newLog
+    entries <- newLog
     let signal = Signal.staleAfter 0.001 (Signal.polling 0.001 hang)
-    ending (Signal.rSelect signal (note book "left") (note book "right"))
+    ending (Signal.rSelect signal (note entries "left") (note entries "right"))
       `shouldReturn` FailedWith (tooLong "0.001")
-    notes book `shouldReturn` []
+    notes entries `shouldReturn` []
 
-  it "stops the branch in time when the reading cannot be interrupted, and returns after it" $ do
-    book <- newLog
+  it "stops the branch in time when the reading cannot be interrupted, and returns after the reading" $ do
+    entries <- newLog
     started <- newGate
     stopped <- newGate
     release <- newGate
     level <- newSensor $ \_ -> do
       isStarted <- opened started
-      when isStarted . uninterruptibleMask_ $ pass release >> note book "reading is over"
+      when isStarted . uninterruptibleMask_ $ pass release >> note entries "reading is over"
       pure True
-    let branch = (open started >> hang) `onException` (note book "branch is over" >> open stopped)
+    let branch = (open started >> hang) `onException` (note entries "branch is over" >> open stopped)
         act =
           Signal.rSelect (Signal.staleAfter 0.005 (sensing level)) branch branch
-            `onException` (note book "operator is over" >> open stopped)
-    launching act $ \caller -> do
+            `onException` (note entries "operator is over" >> open stopped)
+    withThread act $ \caller -> do
       pass stopped
       open release
       awaitEnd caller `shouldReturn` (FailedWith (tooLong "0.005") :: Ending ())
-    -- (Again, if the machine is too slow there was no branch.)
+    -- (Again, if the machine is too slow no branch was started.)
     ran <- opened started
-    notes book `shouldReturn` ["branch is over" | ran] ++ ["reading is over" | ran] ++ ["operator is over"]
+    notes entries `shouldReturn` ["branch is over" | ran] ++ ["reading is over" | ran] ++ ["operator is over"]
 
-  it "lets pass readings that are in time" $ do
+  it "has no effect while readings are in time" $ do
     level <- newSensor (pure . (> 20))
     Signal.waitUntil (Signal.staleAfter 3600 (sensing level))
 
-  -- Seen from inside: when the reading began that it knows of.
+  -- Tested on the source itself: since when it has a reading in flight.
   it "does not count the time between readings" $ do
     source <- Source.open (Signal.polling (1 / 0) (pure ())) Source.everyValue {Source.readingTimes = True}
     let reading = Source.inFlightSince source
@@ -198,7 +198,7 @@ stale = do
       atomically reading `shouldReturn` Nothing
       pure (pure ())
 
-  it "does not count the time of a recovery, when it was stopped in the middle of a reading" $ do
+  it "does not count the time of a recovery for which a reading was stopped" $ do
     entered <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> hang)
     source <- Source.open (sensing level) Source.everyValue {Source.readingTimes = True}
@@ -214,7 +214,7 @@ stale = do
       atomically reading >>= (`shouldSatisfy` (/= began))
       pure (pure ())
 
-  it "does not forgive a reading that was overdue when it has ended" $ do
+  it "still fails when the reading that was overdue has ended" $ do
     entered <- newGate
     mayEnd <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> pass mayEnd)
@@ -225,7 +225,7 @@ stale = do
       pass entered
       isStale seen `shouldReturn` True
       open mayEnd
-      -- A view that is asked for later finds the reading that ended in time.
+      -- For a view that is made later, the reading has ended in time.
       eventually $ not <$> (atomically (Source.view source) >>= isStale)
       isStale seen `shouldReturn` True
       pure (pure ())
@@ -234,17 +234,17 @@ stale = do
     condition <- newTestCondition True
     Signal.rSelect (Signal.staleAfter 0.001 (watched condition)) (aWhile 0.001) hang
 
-  it "watches each of several sources" $ do
+  it "applies to each of several sources" $ do
     let signal = (&&) <$> Signal.polling 0.001 (pure True) <*> Signal.polling 0.001 hang
     ending (Signal.waitUntil (Signal.staleAfter 0.005 signal))
       `shouldReturn` FailedWith (tooLong "0.005")
 
   for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN")] $ \(limit, shown) ->
     it ("refuses a limit of " ++ shown ++ ", and nothing starts") $ do
-      book <- newLog
-      let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note book "reading"))
-      ending (Signal.rSelect signal (note book "left") (note book "right"))
+      entries <- newLog
+      let signal = Signal.staleAfter limit (Signal.polling 0.001 (True <$ note entries "reading"))
+      ending (Signal.rSelect signal (note entries "left") (note entries "right"))
         `shouldReturn` FaultedWith ("staleAfter: a period is at least 0.000001 seconds, not " ++ shown)
-      notes book `shouldReturn` []
+      notes entries `shouldReturn` []
  where
   tooLong limit = "FailedBecause " ++ show ("no reading of the signal within " ++ limit ++ " s")

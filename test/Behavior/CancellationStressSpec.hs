@@ -2,11 +2,11 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Storms: thousands of cancellations, at random moments, of random behaviours.
+-- Stress tests: thousands of cancellations, at random moments, of random behaviours.
 --
--- The moment is a random number of 'yield's after the start. A storm proves nothing
--- about a schedule that it does not hit; but whichever it hits, what is checked here
--- must hold, so no example can fail by bad luck.
+-- The moment is a random number of 'yield's after the start. A stress test proves
+-- nothing about schedules that did not occur; but what it checks must hold under every
+-- schedule, so no example can fail by chance.
 module Behavior.CancellationStressSpec (spec) where
 
 import Control.Concurrent
@@ -29,34 +29,34 @@ import Support
 
 spec :: Spec
 spec = guarded . describe "Thousands of cancellations at random moments" $ do
-  it "leave nothing running, through every operator nested in every other" $
+  it "leave nothing running, with every operator nested in every other" $
     property . withMaxSuccess 3000 $ \(Nest nest) leaf (Moments moments) ->
       ioProperty $ do
         inside <- newIORef (0 :: Int)
         let act = foldr placed (perform inside leaf) nest
-        end <- storming moments (leavingNothing act)
+        end <- cancellingAt moments (leavingNothing act)
         left <- readIORef inside
         pure $
           tabulate "it ended" [kindOf end] $
             counterexample (show end) (left === 0 .&&. end `among` leaf)
 
-  it "leave nothing running in a tree of operators whose conditions change all the time" $
+  it "leave nothing running in a tree of operators whose conditions change continually" $
     property . withMaxSuccess 2000 $ \tree (Moments moments) ->
       ioProperty $ do
         inside <- newIORef (0 :: Int)
         input <- newTVarIO (0 :: Int)
         let change = atomically (modifyTVar' input (+ 1))
-        end <- stormingWith change moments (leavingNothing (grow inside input tree))
+        end <- cancellingAtWith change moments (leavingNothing (grow inside input tree))
         left <- readIORef inside
         pure (tabulate "it ended" [kindOf end] (left === 0))
 
-  it "stop an operator that was only just started" $
+  it "stop an operator that has just been started" $
     for_ threaded $ \place ->
       replicateM_ 50 $ do
         end <- cancelling (leavingNothing (placed place hang)) (pure ())
         end `shouldBe` (CancelledBy (show (Cancel "the caller")) :: Ending ())
 
-  it "are never taken for the failure of a moment before or after" $
+  it "are never taken for a failure that occurs shortly before or after" $
     for_ [1 .. 600 :: Int] $ \n -> do
       let failing = replicateM_ (1 + n `mod` 7) yield >> failed
           act = case n `mod` 4 of
@@ -64,8 +64,8 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
             1 -> fallbackOver (repeat ()) (const failing)
             2 -> attempt maxBound (parallel failing hang)
             _ -> attempt maxBound (both hang failing)
-      end <- storming [n `mod` 31] (leavingNothing act)
-      end `shouldBe` CancelledBy (show (Cancel "the storm"))
+      end <- cancellingAt [n `mod` 31] (leavingNothing act)
+      end `shouldBe` CancelledBy (show (Cancel "the stress test"))
 
   it "lose no fault that a branch has thrown" $
     property . withMaxSuccess 2000 $
@@ -74,46 +74,46 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
           thrown <- newIORef False
           let act = do
                 replicateM_ n yield
-                -- Nothing comes between the note and the fault.
+                -- No cancellation can arrive between the write and the fault.
                 mask_ (writeIORef thrown True >> throwIO (Fault "branch"))
-          end <- storming moments (placed place act)
+          end <- cancellingAt moments (placed place act)
           wasThrown <- readIORef thrown
-          pure . cover 10 wasThrown "the branch came to its fault" . counterexample (show end) $
+          pure . cover 10 wasThrown "the branch reached its fault" . counterexample (show end) $
             case end of
               FaultedWith fault -> fault === show (Fault "branch")
               CancelledWithFault _ fault -> fault === show (Fault "branch")
               _ -> wasThrown === False
 
-  it "do not come between a failure and the alternative, and both get what they should" $
+  it "do not separate a failure from its alternative: the caller is cancelled, or the alternative runs" $
     property . withMaxSuccess 1000 $ \(NonNegative n) (Moments moments) ->
       ioProperty $ do
         (end, done) <- do
-          notebook <- newLog
-          let first = replicateM_ n yield >> note notebook 'f' >> failed
-          e <- storming moments (first ? note notebook 's')
-          (,) e <$> notes notebook
+          entries <- newLog
+          let first = replicateM_ n yield >> note entries 'f' >> failed
+          e <- cancellingAt moments (first ? note entries 's')
+          (,) e <$> notes entries
         pure . counterexample (show (end, done)) $
           case end of
             Gave () -> done === "fs"
             CancelledBy _ -> property (done `elem` ["", "f", "fs"])
             _ -> property False
 
--- | The places of branches. (A sensor is none: that it faulted counts for less than
--- that the caller was cancelled.)
+-- | The places of branches. (A sensor is not a branch: a cancellation of the caller takes
+-- precedence over a sensor's fault.)
 branches :: [Place]
 branches = [place | place <- threaded, (labelBranch <$> placeLabel place) /= Just "polling"]
 
--- | Cancels the caller after so many 'yield's, and again after so many more, and so
--- on; then says how it ended.
-storming :: [Int] -> IO a -> IO (Ending a)
-storming = stormingWith (pure ())
+-- | Cancels the caller after the first number of 'yield's, again after the second number
+-- of further 'yield's, and so on; then returns how it ended.
+cancellingAt :: [Int] -> IO a -> IO (Ending a)
+cancellingAt = cancellingAtWith (pure ())
 
-stormingWith :: IO () -> [Int] -> IO a -> IO (Ending a)
-stormingWith meanwhile moments act =
-  launching act $ \caller -> do
+cancellingAtWith :: IO () -> [Int] -> IO a -> IO (Ending a)
+cancellingAtWith meanwhile moments act =
+  withThread act $ \caller -> do
     for_ moments $ \moment -> do
       replicateM_ moment (meanwhile >> yield)
-      throwing (asyncThreadId caller) (Cancel "the storm")
+      throwing (asyncThreadId caller) (Cancel "the stress test")
     awaitEnd caller
 
 -- | How often to yield before each of one to three cancellations.
@@ -131,7 +131,8 @@ instance Arbitrary Nest where
   arbitrary = Nest <$> (choose (1, 4) >>= \n -> vectorOf n (elements places))
   shrink (Nest nest) = [Nest fewer | fewer@(_ : _) <- shrinkList (const []) nest]
 
--- | What is done at the bottom: so many 'yield's, then one of these.
+-- | What runs inside all operators: the given number of 'yield's, then one of these ends,
+-- and its cleanup.
 data Leaf = Leaf Int Bottom Cleanup
   deriving (Show)
 
@@ -144,10 +145,10 @@ data Cleanup = Quick | Slow | Faulty
 instance Arbitrary Leaf where
   arbitrary = Leaf <$> choose (0, 30) <*> arbitraryBoundedEnum <*> arbitraryBoundedEnum
 
--- | Counts in and out, however it ends; the way out cannot be interrupted.
+-- | Counts itself while it runs, however it ends; its cleanup cannot be interrupted.
 perform :: IORef Int -> Leaf -> IO ()
 perform inside (Leaf n bottom cleanup) =
-  bracket_ (count 1) (uninterruptibleMask_ goingOut) $ do
+  bracket_ (count 1) (uninterruptibleMask_ leave) $ do
     replicateM_ n yield
     case bottom of
       Hangs -> hang
@@ -156,7 +157,7 @@ perform inside (Leaf n bottom cleanup) =
       FaultsThen -> throwIO (Fault "bottom")
  where
   count d = atomicModifyIORef' inside (\k -> (k + d, ()))
-  goingOut = do
+  leave = do
     case cleanup of
       Quick -> pure ()
       _ -> replicateM_ 20 yield
@@ -165,18 +166,18 @@ perform inside (Leaf n bottom cleanup) =
       Faulty -> throwIO (Fault "cleanup")
       _ -> pure ()
 
--- | How something can end that has the leaf at its bottom: as the leaf does, or
--- cancelled. (A cleanup that faults while the leaf runs in the caller's thread takes
--- the cancellation's place, as everywhere in GHC.)
+-- | Whether operators around the leaf may end so: as the leaf does, or cancelled. (The
+-- fault of a cleanup replaces the cancellation if the leaf runs in the caller's thread, as
+-- in GHC generally.)
 among :: Ending () -> Leaf -> Bool
 among end (Leaf _ bottom cleanup) = case end of
-  CancelledBy e -> e == storm
-  CancelledWithFault e fault -> e == storm && fault `elem` faults
+  CancelledBy e -> e == theCancel
+  CancelledWithFault e fault -> e == theCancel && fault `elem` faults
   FaultedWith fault -> fault `elem` faults
   Gave () -> bottom == Returns && cleanup /= Faulty
   FailedWith e -> bottom == FailsThen && cleanup /= Faulty && e == show theFailure
  where
-  storm = show (Cancel "the storm")
+  theCancel = show (Cancel "the stress test")
   faults =
     [show (Fault "bottom") | bottom == FaultsThen] ++ [show (Fault "cleanup") | cleanup == Faulty]
 
@@ -197,7 +198,7 @@ data Tree
   | Races [Tree]
   | Gathers [Tree]
   | Forking Tree [Tree]
-  | -- | The children are asked to stop before the last.
+  | -- | The stops of the children are requested before the last tree runs.
     Retracting Tree [Tree] Tree
   | Within Double Tree
   | Select Tree Tree

@@ -29,24 +29,24 @@ spec = guarded $ do
   describe "tryAny and catchAny" catchingAny
   describe "failingOn" failingOns
   describe "a composition of ?, attempt, fallbackOver, >>= and pure" $
-    it "ends as the pure model says, having done the same in the same order" $
+    it "ends as the pure model predicts, with equal entries in the same order" $
       property $ \expression ->
         ioProperty $ do
           count <- newIORef 0
-          actual <- observing (\notebook -> run count notebook expression)
+          actual <- observing (\entries -> run count entries expression)
           let (end, _, done) = predict 0 expression
           pure (cover 10 (length done > 3) "more than three effects" (actual === (end, done)))
 
 hierarchy :: Spec
 hierarchy = do
-  it "lets a failure of one's own type be caught by that type" $
+  it "lets a failure of a user's own type be caught by that type" $
     (throwIO (Failure "locked") `catch` \(Failure why) -> pure why) `shouldReturn` "locked"
 
   it "does not catch one failure type by another" $
     ending (throwIO (Failure "locked") `catch` \(_ :: Failed) -> pure ())
       `shouldReturn` FailedWith (show (Failure "locked"))
 
-  it "lets every failure be caught by the root, which shows what it holds" $ do
+  it "lets every failure be caught by the root type, which shows the failure that it holds" $ do
     (throwIO (Failure "locked") `catch` \(e :: BehaviorFailed) -> pure (show e))
       `shouldReturn` show (Failure "locked")
     (failWith "stuck" `catch` \(e :: BehaviorFailed) -> pure (displayException e))
@@ -63,7 +63,7 @@ hierarchy = do
     (failWith "no grip" :: IO ()) `shouldThrow` (== FailedBecause "no grip")
     displayException Failed `shouldBe` "the behaviour failed"
 
-  it "fails in a transaction too, which is then undone" $ do
+  it "fails in a transaction too, which is then rolled back" $ do
     var <- newTVarIO 'a'
     atomically (writeTVar var 'b' >> failed) ? pure ()
     readTVarIO var `shouldReturn` 'a'
@@ -77,37 +77,37 @@ fallbacks = do
   it "is associative" $
     property $ \a b c ->
       sameAs
-        (\notebook -> (play notebook a ? play notebook b) ? play notebook c)
-        (\notebook -> play notebook a ? (play notebook b ? play notebook c))
+        (\entries -> (play entries a ? play entries b) ? play entries c)
+        (\entries -> play entries a ? (play entries b ? play entries c))
 
-  it "has failed for its identity on the left" $
+  it "has failed as its left identity" $
     property $ \a ->
-      sameAs (\notebook -> failed ? play notebook a) (`play` a)
+      sameAs (\entries -> failed ? play entries a) (`play` a)
 
-  it "has failed on the right as its identity but for the failure, which is Failed" $
+  it "has failed as its right identity, except that the failure becomes Failed" $
     property $ \a ->
       sameAs
-        (\notebook -> play notebook a ? failed)
-        (\notebook -> play notebook a `catch` \(_ :: BehaviorFailed) -> throwIO Failed)
+        (\entries -> play entries a ? failed)
+        (\entries -> play entries a `catch` \(_ :: BehaviorFailed) -> throwIO Failed)
 
   it "is absorbed by pure, by a fault and by a cancellation on the left" $
     property $ \(n :: Int) a -> do
-      sameAs (\notebook -> pure n ? play notebook a) (\_ -> pure n)
-        .&&. sameAs (\notebook -> throwIO (Fault "bug") ? play notebook a) (\_ -> throwIO (Fault "bug"))
-        .&&. sameAs (\notebook -> throwIO (Cancel "user") ? play notebook a) (\_ -> throwIO (Cancel "user"))
+      sameAs (\entries -> pure n ? play entries a) (\_ -> pure n)
+        .&&. sameAs (\entries -> throwIO (Fault "bug") ? play entries a) (\_ -> throwIO (Fault "bug"))
+        .&&. sameAs (\entries -> throwIO (Cancel "user") ? play entries a) (\_ -> throwIO (Cancel "user"))
 
-  it "is the same as an operator and by its name" $
+  it "is the same under its two names, ? and fallback" $
     property $ \a b ->
       sameAs
-        (\notebook -> play notebook a ? play notebook b)
-        (\notebook -> fallback (play notebook a) (play notebook b))
+        (\entries -> play entries a ? play entries b)
+        (\entries -> fallback (play entries a) (play entries b))
 
   it "binds tighter than >>" $ do
-    -- pure () ? (left >> right) would note nothing.
-    observing (\notebook -> pure () ? note notebook 'l' >> note notebook 'r')
+    -- pure () ? (left >> right) would add no entry.
+    observing (\entries -> pure () ? note entries 'l' >> note entries 'r')
       `shouldReturn` (Gave (), "r")
 
-  it "nests to the right, or it could not be mixed with an operator that does" $
+  it "nests to the right, so that it can be mixed with other operators that do" $
     (failed ? failed |?| pure 'c') `shouldReturn` 'c'
 
   it "catches a failure of every type" $
@@ -115,17 +115,17 @@ fallbacks = do
       (failure ? pure "recovered") `shouldReturn` "recovered"
 
   it "does not run the second behaviour when the first faults, also with a bug in pure code" $ do
-    observing (\notebook -> throwIO (Fault "bug") ? note notebook 'r')
+    observing (\entries -> throwIO (Fault "bug") ? note entries 'r')
       `shouldReturn` (FaultedWith (show (Fault "bug")), "")
-    observing (\notebook -> evaluate (1 `div` (0 :: Int)) ? (1 <$ note notebook 'r'))
+    observing (\entries -> evaluate (1 `div` (0 :: Int)) ? (1 <$ note entries 'r'))
       `shouldReturn` (FaultedWith (show DivideByZero), "")
 
   it "does not run the second behaviour when the first is cancelled" $ do
-    notebook <- newLog
+    entries <- newLog
     inside <- newGate
-    cancelling ((open inside >> hang) ? note notebook 'r') (pass inside)
+    cancelling ((open inside >> hang) ? note entries 'r') (pass inside)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
-    notes notebook `shouldReturn` ""
+    notes entries `shouldReturn` ""
 
   it "can be cancelled in the second behaviour" $ do
     inside <- newGate
@@ -133,11 +133,11 @@ fallbacks = do
       `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
 
   it "runs the second behaviour after the handlers of the first have ended" $ do
-    let first notebook = (failed `onException` note notebook "handler") `finally` note notebook "cleanup"
-    observing (\notebook -> first notebook ? note notebook "second")
+    let first entries = (failed `onException` note entries "handler") `finally` note entries "cleanup"
+    observing (\entries -> first entries ? note entries "second")
       `shouldReturn` (Gave (), ["handler", "cleanup", "second"])
 
-  it "takes the failure of a cleanup for a failure, and its fault for a fault" $ do
+  it "treats the failure of a cleanup as a failure, and its fault as a fault" $ do
     (throwIO (Fault "bug") `finally` failWith "cleanup" ? pure ()) `shouldReturn` ()
     (failed `finally` throwIO (Fault "cleanup") ? pure ()) `shouldThrow` (== Fault "cleanup")
 
@@ -149,19 +149,19 @@ fallbacks = do
 
 fallbacksWith :: Spec
 fallbacksWith = do
-  it "is fallback when the second behaviour does not look at the failure" $
+  it "is fallback when the second behaviour does not use the failure" $
     property $ \a b ->
       sameAs
-        (\notebook -> fallbackWith (play notebook a) (const (play notebook b)))
-        (\notebook -> play notebook a ? play notebook b)
+        (\entries -> fallbackWith (play entries a) (const (play entries b)))
+        (\entries -> play entries a ? play entries b)
 
-  it "gives the second behaviour the failure" $ do
+  it "passes the failure to the second behaviour" $ do
     fallbackWith (throwIO (Failure "locked")) (pure . show) `shouldReturn` show (Failure "locked")
     fallbackWith (throwIO (Failure "locked")) throwIO `shouldThrow` (== Failure "locked")
 
   it "runs the second behaviour after the handlers of the first have ended" $ do
-    let first notebook = (failed `onException` note notebook "handler") `finally` note notebook "cleanup"
-    observing (\notebook -> fallbackWith (first notebook) (const (note notebook "second")))
+    let first entries = (failed `onException` note entries "handler") `finally` note entries "cleanup"
+    observing (\entries -> fallbackWith (first entries) (const (note entries "second")))
       `shouldReturn` (Gave (), ["handler", "cleanup", "second"])
 
   it "can be cancelled in the second behaviour" $ do
@@ -174,19 +174,19 @@ fallbacksWith = do
 
 catchingAny :: Spec
 catchingAny = do
-  it "gives the result, the failure or the fault, and lets a cancellation through" $
+  it "gives the result, the failure or the fault, and rethrows a cancellation" $
     property $ \(Script name end) ->
       ioProperty $ do
-        (actual, _) <- observing (\notebook -> either (Left . show) Right <$> tryAny (play notebook (Script name end)))
+        (actual, _) <- observing (\entries -> either (Left . show) Right <$> tryAny (play entries (Script name end)))
         pure $ case end of
           Succeeds n -> actual === Gave (Right n)
           Fails why -> actual === Gave (Left (show (Failure why)))
           Faults why -> actual === Gave (Left (show (Fault why)))
           Cancels why -> actual === CancelledBy (show (Cancel why))
 
-  it "chooses by type: a synchronous one thrown from outside counts as the behaviour's own" $ do
+  it "decides by type: a synchronous exception thrown from outside counts as the behaviour's own" $ do
     inside <- newGate
-    launching (either show show <$> tryAny (open inside >> hang :: IO ())) $ \caller -> do
+    withThread (either show show <$> tryAny (open inside >> hang :: IO ())) $ \caller -> do
       pass inside
       throwTo (asyncThreadId caller) (Fault "from outside")
       awaitEnd caller `shouldReturn` Gave (show (Fault "from outside"))
@@ -194,15 +194,15 @@ catchingAny = do
   it "is tryAny, then the handler" $
     property $ \a b ->
       sameAs
-        (\notebook -> catchAny (play notebook a) (const (play notebook b)))
-        (\notebook -> tryAny (play notebook a) >>= either (const (play notebook b)) pure)
+        (\entries -> catchAny (play entries a) (const (play entries b)))
+        (\entries -> tryAny (play entries a) >>= either (const (play entries b)) pure)
 
-  it "does not keep a caller that is cancelled from stopping" $ do
-    notebook <- newLog
+  it "does not prevent a cancelled caller from stopping" $ do
+    entries <- newLog
     inside <- newGate
-    cancelling (catchAny (open inside >> hang) (\_ -> note notebook "went on")) (pass inside)
+    cancelling (catchAny (open inside >> hang) (\_ -> note entries "went on")) (pass inside)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
-    notes notebook `shouldReturn` []
+    notes entries `shouldReturn` []
 
   it "can be cancelled in the handler" $ do
     inside <- newGate
@@ -219,7 +219,7 @@ fallbacksOver = do
     property $ \(scripts :: NonEmptyList Script) ->
       sameAs
         (fallbackOver (getNonEmpty scripts) . play)
-        (\notebook -> foldr1 (?) (map (play notebook) (getNonEmpty scripts)))
+        (\entries -> foldr1 (?) (map (play entries) (getNonEmpty scripts)))
 
   it "fails with Failed on nothing" $
     (fallbackOver [] pure :: IO ()) `shouldThrow` (== Failed)
@@ -228,15 +228,15 @@ fallbacksOver = do
     (fallbackOver ["front", "back", "cellar"] failWith :: IO ())
       `shouldThrow` (== FailedBecause "cellar")
 
-  it "goes over any container, and no further into an endless one than it must" $ do
+  it "takes any container, and evaluates an endless one only as far as needed" $ do
     fallbackOver (Just 'a') pure `shouldReturn` 'a'
     fallbackOver ('a' NonEmpty.:| "bc") (\x -> if x == 'b' then pure x else failed) `shouldReturn` 'b'
     fallbackOver [1 :: Int ..] (\x -> if x == 7 then pure x else failed) `shouldReturn` 7
 
-  it "lets a fault and a cancellation through at once" $
+  it "rethrows a fault and a cancellation at once" $
     for_ [toException (Fault "bug"), toException (Cancel "user")] $ \e -> do
-      (end, tried) <- observing $ \notebook ->
-        fallbackOver "abc" (\x -> note notebook x >> if x == 'b' then throwIO e else failed :: IO ())
+      (end, tried) <- observing $ \entries ->
+        fallbackOver "abc" (\x -> note entries x >> if x == 'b' then throwIO e else failed :: IO ())
       end `shouldBe` endingOf (Left e)
       tried `shouldBe` "ab"
 
@@ -253,51 +253,51 @@ attempts = do
         (_, done) <- observing (attempt n . inTurn scripts)
         pure (cover 20 (runs > 1) "more than one try" (length done === runs))
 
-  it "throws the last failure as it is" $ do
+  it "throws the last failure unchanged" $ do
     count <- newIORef (0 :: Int)
     attempt 3 (modifyIORef count (+ 1) >> readIORef count >>= throwIO . Failure . show)
       `shouldThrow` (== Failure "3")
 
   it "is the behaviour itself when tried once" $
-    property $ \a -> sameAs (\notebook -> attempt 1 (play notebook a)) (`play` a)
+    property $ \a -> sameAs (\entries -> attempt 1 (play entries a)) (`play` a)
 
   it "is act ? attempt n act when tried n + 1 times" $
     property $ \(Positive n) (Scripts scripts) ->
       sameAs
         (attempt (n + 1) . inTurn scripts)
-        (\notebook -> let act = inTurn scripts notebook in act ? attempt n act)
+        (\entries -> let act = inTurn scripts entries in act ? attempt n act)
 
-  it "multiplies when nested" $
+  it "multiplies the numbers of tries when nested" $
     forAll ((,) <$> choose (0, 12) <*> choose (0, 12)) $ \(m, n) ->
       ioProperty $ do
-        (end, done) <- observing (\notebook -> attempt m (attempt n (note notebook () >> failed)))
+        (end, done) <- observing (\entries -> attempt m (attempt n (note entries () >> failed)))
         pure ((end, length done) === (FailedWith (show Failed) :: Ending (), m * n))
 
   it "fails at once with Failed, and runs nothing, when tried zero or fewer times" $
     for_ [0, -1, minBound] $ \n ->
-      observing (\notebook -> attempt n (note notebook 'a'))
+      observing (\entries -> attempt n (note entries 'a'))
         `shouldReturn` (FailedWith (show Failed), "")
 
-  it "lets a fault and a cancellation through at once" $
+  it "rethrows a fault and a cancellation at once" $
     for_ [toException (Fault "bug"), toException (Cancel "user")] $ \e ->
-      observing (\notebook -> attempt 3 (note notebook 'a' >> throwIO e :: IO ()))
+      observing (\entries -> attempt 3 (note entries 'a' >> throwIO e :: IO ()))
         `shouldReturn` (endingOf (Left e), "a")
 
-  it "can be cancelled in every try, and makes no other then" $
+  it "can be cancelled in every try, and then makes no further one" $
     for_ [1 .. 3 :: Int] $ \try' -> do
-      notebook <- newLog
+      entries <- newLog
       inside <- newGate
       let act = do
-            note notebook ()
-            tries <- length <$> notes notebook
+            note entries ()
+            tries <- length <$> notes entries
             if tries == try' then open inside >> hang else failed
       cancelling (attempt 3 act) (pass inside)
         `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
-      length <$> notes notebook `shouldReturn` try'
+      length <$> notes entries `shouldReturn` try'
 
   it "composes with a behaviour that takes an argument" $ do
-    let open' notebook door = note notebook door >> failed :: IO ()
-    snd <$> observing (\notebook -> (attempt 2 . open' notebook) "front")
+    let open' entries door = note entries door >> failed :: IO ()
+    snd <$> observing (\entries -> (attempt 2 . open' entries) "front")
       `shouldReturn` ["front", "front"]
 
   inCallersState "every try" $ \act -> do
@@ -315,53 +315,53 @@ failingOns = do
     (failingOn bug (throwIO (Fault "no device")) `catch` \(BehaviorFailed e) -> pure (show e))
       `shouldReturn` show (Fault "no device")
 
-  it "leaves a fault that is not chosen, by its value or by its type, what it is" $ do
+  it "leaves a fault unchanged that is not chosen, by its value or by its type" $ do
     failingOn (\(Fault why) -> why == "no device") (throwIO (Fault "bug"))
       `shouldThrow` (== Fault "bug")
     failingOn isDoesNotExistError (throwIO (Fault "bug")) `shouldThrow` (== Fault "bug")
 
-  it "turns an error of the system into a failure" $
+  it "turns a system error into a failure" $
     (failingOn isDoesNotExistError (readFile "/no/such/device") ? pure "no sensor")
       `shouldReturn` "no sensor"
 
-  it "changes nothing of what was not thrown, or not chosen" $
+  it "changes nothing when no exception is thrown, or none that is chosen" $
     property $ \a ->
-      sameAs (\notebook -> failingOn (\(_ :: Fault) -> False) (play notebook a)) (`play` a)
+      sameAs (\entries -> failingOn (\(_ :: Fault) -> False) (play entries a)) (`play` a)
 
-  it "turns just the faults into failures when all exceptions are chosen" $
+  it "turns only the faults into failures when all exceptions are chosen" $
     property $ \(Script name end) ->
       ioProperty $ do
-        (actual, _) <- observing (\notebook -> failingOn everything (play notebook (Script name end)))
+        (actual, _) <- observing (\entries -> failingOn everything (play entries (Script name end)))
         pure $ case end of
           Faults why -> actual === FailedWith (show (Fault why))
           Succeeds n -> actual === Gave n
           Fails why -> actual === FailedWith (show (Failure why))
           Cancels why -> actual === CancelledBy (show (Cancel why))
 
-  it "leaves a failure the failure that it is, caught by its own type" $
+  it "leaves a failure unchanged, so that it is caught by its own type" $
     (failingOn everything (throwIO (Failure "locked")) `catch` \(Failure why) -> pure why)
       `shouldReturn` "locked"
 
-  it "never turns a cancellation into anything, whatever type is asked for" $ do
+  it "never changes a cancellation, whatever type is chosen" $ do
     failingOn (\(_ :: AsyncException) -> True) (throwIO ThreadKilled)
       `shouldThrow` (== ThreadKilled)
     failingOn (\(_ :: SomeAsyncException) -> True) (throwIO UserInterrupt)
       `shouldThrow` (== UserInterrupt)
     failingOn (\(_ :: Cancel) -> True) (throwIO (Cancel "user")) `shouldThrow` (== Cancel "user")
 
-  it "does not keep a caller that is cancelled from stopping" $ do
-    notebook <- newLog
+  it "does not prevent a cancelled caller from stopping" $ do
+    entries <- newLog
     inside <- newGate
-    cancelling (failingOn everything (open inside >> hang) ? note notebook "went on") (pass inside)
+    cancelling (failingOn everything (open inside >> hang) ? note entries "went on") (pass inside)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
-    notes notebook `shouldReturn` []
+    notes entries `shouldReturn` []
 
-  it "does not keep a behaviour that is out of time from stopping" $ do
-    (end, done) <- observing $ \notebook ->
-      timeout 0.001 (failingOn everything hang ? note notebook "went on")
+  it "does not prevent a behaviour that has timed out from stopping" $ do
+    (end, done) <- observing $ \entries ->
+      timeout 0.001 (failingOn everything hang ? note entries "went on")
     (end, done) `shouldBe` (FailedWith (show (TimedOut 0.001)), [])
-    (end', done') <- observing $ \notebook ->
-      System.timeout 1000 (failingOn everything hang ? note notebook "went on")
+    (end', done') <- observing $ \entries ->
+      System.timeout 1000 (failingOn everything hang ? note entries "went on")
     (end', done') `shouldBe` (Gave Nothing, [])
 
   inCallersState "its behaviour" (failingOn everything)
@@ -397,11 +397,11 @@ isFailing :: Script -> Bool
 isFailing (Script _ (Fails _)) = True
 isFailing _ = False
 
--- | Plays the scripts in turn, the last again and again.
+-- | Plays the scripts in turn, then the last one repeatedly.
 inTurn :: [Script] -> Log String -> IO Int
-inTurn scripts notebook = do
-  soFar <- length <$> notes notebook
-  play notebook ((scripts ++ repeat (last scripts)) !! soFar)
+inTurn scripts entries = do
+  played <- length <$> notes entries
+  play entries ((scripts ++ repeat (last scripts)) !! played)
 
 -- | A composition of the sequential operators.
 data Expression
@@ -435,19 +435,19 @@ instance Arbitrary Expression where
     a :> b -> [a, b] ++ [a' :> b | a' <- shrink a] ++ [a :> b' | b' <- shrink b]
 
 run :: IORef Int -> Log String -> Expression -> IO Int
-run count notebook = go
+run count entries = go
  where
   go expression = case expression of
     Play scripts -> do
       n <- atomicModifyIORef' count (\n -> (n + 1, n))
-      play notebook (scripts !! (n `mod` length scripts))
+      play entries (scripts !! (n `mod` length scripts))
     a :? b -> go a ? go b
     Attempt n a -> attempt n (go a)
     Over as -> fallbackOver as go
     a :> b -> (void . go >=> const (go b)) a
 
--- | How it ends when so many scripts were played before, how many have been played
--- then, and what they noted.
+-- | How the expression ends when the given number of scripts were played before it; how many
+-- have been played after it; and the entries that they added.
 predict :: Int -> Expression -> (Ending Int, Int, [String])
 predict count expression = case expression of
   Play scripts ->
@@ -455,17 +455,17 @@ predict count expression = case expression of
      in (inPure end, count + 1, [name])
   a :? b -> predict count a `orOnFailure` (`predict` b)
   Attempt n a
-    | n <= 0 -> noWay
+    | n <= 0 -> noTry
     | n == 1 -> predict count a
     | otherwise -> predict count a `orOnFailure` (`predict` Attempt (n - 1) a)
-  Over [] -> noWay
+  Over [] -> noTry
   Over [a] -> predict count a
   Over (a : as) -> predict count a `orOnFailure` (`predict` Over as)
   a :> b -> case predict count a of
     (Gave _, count', done) -> done `before'` predict count' b
     other -> other
  where
-  noWay = (FailedWith (show Failed), count, [])
+  noTry = (FailedWith (show Failed), count, [])
   orOnFailure (FailedWith _, count', done) second = done `before'` second count'
   orOnFailure other _ = other
   before' done (end, count', done') = (end, count', done ++ done')

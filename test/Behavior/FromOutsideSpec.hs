@@ -1,9 +1,9 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- What is thrown at the caller of an operator from outside, of a synchronous type (as by
--- @throwTo main (ExitFailure 3)@ in a signal handler); and what users' code throws in the
--- operator's own thread, or as an exception that is itself undefined.
+-- Exceptions of a synchronous type that are thrown to the caller of an operator from outside
+-- (as by @throwTo main (ExitFailure 3)@ in a signal handler); exceptions that users' code throws
+-- in the operator's own thread; and exceptions that are themselves undefined.
 module Behavior.FromOutsideSpec (spec) where
 
 import Control.Concurrent.Async (asyncThreadId)
@@ -25,11 +25,11 @@ import Support hiding (End (..))
 
 spec :: Spec
 spec = guarded $ do
-  describe "What is thrown at the caller from outside, of a synchronous type," thrownAtTheCaller
+  describe "A synchronous exception that is thrown to the caller from outside" thrownToTheCaller
   describe "Users' code in the operator's thread" usersCode
   describe "An exception that is itself undefined" undefinedExceptions
 
--- | Each operator, as it runs a branch that goes on until it is stopped.
+-- | Each operator, with a branch that runs until it is stopped.
 operators :: [(String, Behavior String -> Behavior String)]
 operators =
   [ ("parallel", \act -> "" <$ parallel act hang)
@@ -53,19 +53,19 @@ operators =
 data Stopping = Stops | Completes | Fails | Faults
   deriving (Bounded, Enum, Eq, Show)
 
-thrownAtTheCaller :: Spec
-thrownAtTheCaller = do
+thrownToTheCaller :: Spec
+thrownToTheCaller = do
   for_ operators $ \(name, operator) ->
     for_ [minBound ..] $ \stopping -> do
-      it (name ++ ": gets out, though its branch " ++ manner stopping) $ do
+      it (name ++ ": is thrown by the operator, though the branch " ++ manner stopping) $ do
         end <- hit (operator . endingBy stopping)
         end `shouldBe` expected stopping
-      it (name ++ ": is not caught by ?, though its branch " ++ manner stopping) $ do
+      it (name ++ ": is not caught by ?, though the branch " ++ manner stopping) $ do
         end <- hit (\entered -> operator (endingBy stopping entered) ? pure "goes on!")
         end `shouldBe` expected stopping
 
-  it "waitUntil: gets out" $ do
-    end <- launching (Signal.waitUntil (pure False)) $ \caller -> do
+  it "waitUntil: is thrown by the operator" $ do
+    end <- withThread (Signal.waitUntil (pure False)) $ \caller -> do
       awaitIdle (asyncThreadId caller)
       throwing (asyncThreadId caller) (ExitFailure 3)
       awaitEnd caller
@@ -73,7 +73,7 @@ thrownAtTheCaller = do
  where
   hit act = do
     entered <- newGate
-    launching (act entered) $ \caller -> do
+    withThread (act entered) $ \caller -> do
       pass entered
       throwing (asyncThreadId caller) (ExitFailure 3)
       awaitEnd caller
@@ -85,7 +85,7 @@ thrownAtTheCaller = do
       Faults -> throwIO (Fault "a cleanup")
   manner = \case
     Stops -> "stops"
-    Completes -> "completes all the same"
+    Completes -> "nevertheless completes"
     Fails -> "fails while it stops"
     Faults -> "faults while it stops"
   expected = \case
@@ -110,14 +110,14 @@ usersCode = do
       (Signal.watching (readTVar level))
       (atomically (writeTVar level (Key 1)))
       (FaultedWith (show (Fault "equality")))
-  it "firstOf, allOf: what was started of a list that ends in an error has ended when that gets out" $ do
-    book <- newLog
+  it "firstOf, allOf: when the list of behaviours ends in an error, the started branches end before it is thrown" $ do
+    entries <- newLog
     for_ [firstOf, void . allOf] $ \operator -> do
       entered <- newGate
-      let started = (open entered >> hang) `uninterruptibly` note book "cleaned up"
+      let started = (open entered >> hang) `uninterruptibly` note entries "cleaned up"
           list = started : (unsafePerformIO (pass entered) `seq` throw (Fault "list"))
       ending (operator list) `shouldReturn` FaultedWith (show (Fault "list"))
-    notes book `shouldReturn` ["cleaned up", "cleaned up"]
+    notes entries `shouldReturn` ["cleaned up", "cleaned up"]
  where
   followers =
     [ ("whileHolding", Signal.whileHolding)
@@ -127,19 +127,19 @@ usersCode = do
     , ("teleoReactive", \signal act -> Signal.teleoReactive [(signal, act)])
     ] :: [(String, Signal Bool -> Behavior () -> Behavior ())]
 
--- | Runs the operator; its cleanup is over when the operator ends so.
+-- | Runs the operator, which must end as given, after the cleanup of its branch.
 stoppedFirst :: (Signal k -> Behavior () -> Behavior ()) -> Signal k -> IO () -> Ending () -> IO ()
 stoppedFirst follower signal breakIt expected = do
   entered <- newGate
-  book <- newLog
-  end <- launching (follower signal ((open entered >> hang) `uninterruptibly` note book "cleaned up")) $ \caller -> do
+  entries <- newLog
+  end <- withThread (follower signal ((open entered >> hang) `uninterruptibly` note entries "cleaned up")) $ \caller -> do
     pass entered
     breakIt
     awaitEnd caller
   end `shouldBe` expected
-  notes book `shouldReturn` ["cleaned up"]
+  notes entries `shouldReturn` ["cleaned up"]
 
--- | One that is not to be compared with others.
+-- | A key that cannot be compared with another one.
 newtype Key = Key Int
 
 instance Eq Key where
@@ -155,21 +155,21 @@ undefinedExceptions = do
         beside bottom operator
     it ("withShared, " ++ kind ++ ": ends as a fault, after its sensor has ended") $ do
       reading <- newGate
-      book <- newLog
-      let sensor = Signal.polling 0.001 ((open reading >> hang) `uninterruptibly` note book "cleaned up")
+      entries <- newLog
+      let sensor = Signal.polling 0.001 ((open reading >> hang) `uninterruptibly` note entries "cleaned up")
       ending (Signal.withShared sensor (\_ -> pass reading >> bottom)) `shouldReturn` FaultedWith (show (Fault "undefined"))
-      notes book `shouldReturn` ["cleaned up"]
-    it ("monitor, " ++ kind ++ ": of the task while it stops, comes after the recovery") $ do
+      notes entries `shouldReturn` ["cleaned up"]
+    it ("monitor, " ++ kind ++ ": thrown by the task while it stops, is rethrown after the recovery") $ do
       condition <- newTVarIO False
       entered <- newGate
-      book <- newLog
-      end <- launching (Signal.monitor (Signal.watching (readTVar condition)) (note book "recovered") ((open entered >> hang) `onException` bottom)) $ \caller -> do
+      entries <- newLog
+      end <- withThread (Signal.monitor (Signal.watching (readTVar condition)) (note entries "recovered") ((open entered >> hang) `onException` bottom)) $ \caller -> do
         pass entered
         atomically (writeTVar condition True)
         awaitEnd caller
       end `shouldBe` (FaultedWith (show (Fault "undefined")) :: Ending ())
-      notes book `shouldReturn` ["recovered"]
-  it "that other undefined exceptions are made of: the same" $
+      notes entries `shouldReturn` ["recovered"]
+  it "made of other undefined exceptions: ends as a fault too" $
     for_ (take 3 (iterate throw (throw (Fault "undefined") :: SomeException))) $ \bottom ->
       beside (throwIO bottom) parallel
  where
@@ -179,7 +179,7 @@ undefinedExceptions = do
     , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed (throw (Fault "undefined") :: Failed)))
     , ("SomeAsyncException", throwIO (throw (Fault "undefined") :: SomeAsyncException))
     , ("a cancellation inside SomeAsyncException", throwIO (SomeAsyncException (throw (Fault "undefined") :: Cancel)))
-    , ("of a type of its own", throwIO (throw (Fault "undefined") :: Fault))
+    , ("a user's own type", throwIO (throw (Fault "undefined") :: Fault))
     ]
   several =
     [ ("parallel", parallel)
@@ -193,12 +193,12 @@ undefinedExceptions = do
     entered <- newGate
     stopping <- newGate
     mayEnd <- newGate
-    book <- newLog
-    let slow = (open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd >> note book "cleaned up")
-    end <- launching (operator slow (pass entered >> bottom)) $ \caller -> do
+    entries <- newLog
+    let slow = (open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd >> note entries "cleaned up")
+    end <- withThread (operator slow (pass entered >> bottom)) $ \caller -> do
       pass stopping
       stillRunning caller
       open mayEnd
       awaitEnd caller
     end `shouldBe` FaultedWith (show (Fault "undefined"))
-    notes book `shouldReturn` ["cleaned up"]
+    notes entries `shouldReturn` ["cleaned up"]

@@ -1,7 +1,7 @@
 -- |
--- 'Signal.monitor' on conditions that are watched: its latch, and what may interrupt
--- what. What it has in common with the other operators is in "Behavior.ReactiveSpec",
--- and how it ends when several things happen in "Behavior.OutcomeSpec".
+-- 'Signal.monitor' on watched conditions: its latch, and which behaviour may interrupt
+-- which. Its promises in common with the other operators are in "Behavior.ReactiveSpec",
+-- and how it ends when several things happen is in "Behavior.OutcomeSpec".
 module Behavior.MonitorSpec (spec) where
 
 import Control.Concurrent (yield)
@@ -25,113 +25,113 @@ import Watched
 spec :: Spec
 spec = guarded . describe "monitor" $ do
   it "reads the condition first: when it is true, the recovery runs before the task" $ do
-    book <- newLog
+    entries <- newLog
     condition <- newTestCondition True
-    let recovery = note book "recovery" >> set condition (Says False)
-    Signal.monitor (watched condition) recovery (note book "task")
-    notes book `shouldReturn` ["recovery", "task"]
+    let recovery = note entries "recovery" >> set condition (Value False)
+    Signal.monitor (watched condition) recovery (note entries "task")
+    notes entries `shouldReturn` ["recovery", "task"]
 
-  -- The task asks for as many recoveries in a row as the script says, again and again.
-  modifyMaxSize (const 15) . prop "recovers until the condition is false, and begins the task anew" $ \script ->
+  -- Each run of the task requires the next number of consecutive recoveries of the script.
+  modifyMaxSize (const 15) . prop "recovers until the condition is false, and restarts the task" $ \script ->
     ioProperty $ do
-      book <- newLog
+      entries <- newLog
       left <- newTVarIO (map getNonNegative script :: [Int])
       needed <- newTVarIO 0
       let task = do
-            note book "task"
+            note entries "task"
             over <- atomically $ do
               counts <- readTVar left
               writeTVar left (drop 1 counts)
               null counts <$ for_ (take 1 counts) (writeTVar needed . (+ 1))
             unless over hang
-          recovery = note book "recovery" >> atomically (modifyTVar' needed (subtract 1))
-      Signal.monitor ((> 0) <$> dialled needed) recovery task
+          recovery = note entries "recovery" >> atomically (modifyTVar' needed (subtract 1))
+      Signal.monitor ((> 0) <$> watchedVar needed) recovery task
       let expected = concatMap (\(NonNegative n) -> "task" : replicate (n + 1) "recovery") script
-      (expected ++ ["task"] ===) <$> notes book
+      (expected ++ ["task"] ===) <$> notes entries
 
   for_ [("is done twice, when it is the result of an inner operator", False), ("is done once, when the branch itself records it", True)] $
     \(often, recording) -> it ("work that is interrupted between its end and an inner operator's return " ++ often) $ do
-      book <- newLog
+      entries <- newLog
       low <- newTVarIO False
       done <- newTVarIO False
-      let deliver = sleep 1 >> note book "deliver"
+      let deliver = sleep 1 >> note entries "deliver"
           once = atomically (readTVar done) >>= \is -> unless is . mask_ $ deliver >> atomically (writeTVar done True)
           phone = hang `uninterruptibly` sleep 2
           mission = Signal.whileHolding (pure True) (firstOf [if recording then once else deliver, phone])
-          charge = note book "charge" >> atomically (writeTVar low False)
-      run <- simulate (Signal.monitor (dialled low) charge mission ||| (sleep 2 >> atomically (writeTVar low True) >> hang))
+          charge = note entries "charge" >> atomically (writeTVar low False)
+      run <- simulate (Signal.monitor (watchedVar low) charge mission ||| (sleep 2 >> atomically (writeTVar low True) >> hang))
       explain (outcome run) `shouldBe` "it returned"
-      notes book `shouldReturn` (if recording then ["deliver", "charge"] else ["deliver", "charge", "deliver"])
+      notes entries `shouldReturn` (if recording then ["deliver", "charge"] else ["deliver", "charge", "deliver"])
 
   it "recovers even if the condition is false again when the task has ended" $ do
-    book <- newLog
+    entries <- newLog
     condition <- newTestCondition False
     entered <- newGate
     let task = do
-          again <- (/= []) <$> notes book
-          note book "task"
-          unless again $ (open entered >> hang) `onException` set condition (Says False)
-    launching (Signal.monitor (watched condition) (note book "recovery") task) $ \caller -> do
+          again <- (/= []) <$> notes entries
+          note entries "task"
+          unless again $ (open entered >> hang) `onException` set condition (Value False)
+    withThread (Signal.monitor (watched condition) (note entries "recovery") task) $ \caller -> do
       pass entered
-      set condition (Says True)
+      set condition (Value True)
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["task", "recovery", "task"]
+    notes entries `shouldReturn` ["task", "recovery", "task"]
 
   it "starts the recovery only after the task, cleanup included, has ended" $ do
-    book <- newLog
+    entries <- newLog
     condition <- newTestCondition False
     entered <- newGate
     cleaning <- newGate
     release <- newGate
     let task = do
-          again <- (/= []) <$> notes book
+          again <- (/= []) <$> notes entries
           unless again $ do
-            note book "task"
+            note entries "task"
             (open entered >> hang) `onException` do
               open cleaning
               pass release
-              note book "task is over"
-        recovery = note book "recovery" >> set condition (Says False)
-    launching (Signal.monitor (watched condition) recovery task) $ \caller -> do
+              note entries "task is over"
+        recovery = note entries "recovery" >> set condition (Value False)
+    withThread (Signal.monitor (watched condition) recovery task) $ \caller -> do
       pass entered
-      set condition (Says True)
+      set condition (Value True)
       pass cleaning
       stillRunning caller
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["task", "task is over", "recovery"]
+    notes entries `shouldReturn` ["task", "task is over", "recovery"]
 
-  it "runs the recovery to completion, whatever the condition says meanwhile" $ do
-    book <- newLog
+  it "runs the recovery to completion, whatever the condition's state meanwhile" $ do
+    entries <- newLog
     condition <- newTestCondition True
     entered <- newGate
     release <- newGate
     let recovery =
-          (open entered >> pass release >> note book "recovered")
-            `onException` note book "interrupted"
-        task = note book "task"
-    launching (Signal.monitor (watched condition) recovery task) $ \caller -> do
+          (open entered >> pass release >> note entries "recovered")
+            `onException` note entries "interrupted"
+        task = note entries "task"
+    withThread (Signal.monitor (watched condition) recovery task) $ \caller -> do
       pass entered
-      for_ [Says False, Says True, SaysFailure, SaysFault, SaysNothing, Says False] $ \news -> do
-        set condition news
+      for_ [Value False, Value True, SensorFailure, SensorFault, NoValue, Value False] $ \newState -> do
+        set condition newState
         stillRunning caller
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["recovered", "task"]
+    notes entries `shouldReturn` ["recovered", "task"]
 
-  for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
-    it ("starts nothing when after the recovery the condition says " ++ show news) $ do
-      book <- newLog
+  for_ [SensorFailure, SensorFault, NoValue] $ \newState ->
+    it ("starts nothing when the condition's state after the recovery is " ++ show newState) $ do
+      entries <- newLog
       condition <- newTestCondition True
-      let recovery = note book "recovery" >> set condition news
-      end <- ending (Signal.monitor (watched condition) recovery (note book "task"))
-      end `shouldBe` case news of
-        SaysFailure -> FailedWith "FailedBecause \"the sensor\""
-        SaysFault -> FaultedWith (show (Fault "the sensor"))
+      let recovery = note entries "recovery" >> set condition newState
+      end <- ending (Signal.monitor (watched condition) recovery (note entries "task"))
+      end `shouldBe` case newState of
+        SensorFailure -> FailedWith "FailedBecause \"the sensor\""
+        SensorFault -> FaultedWith (show (Fault "the sensor"))
         _ -> FailedWith "FailedBecause \"the signal has no value any more\""
-      notes book `shouldReturn` ["recovery"]
+      notes entries `shouldReturn` ["recovery"]
 
-  it "never runs task and recovery at once, however often it recovers" $ do
+  it "never runs task and recovery at the same time, however often it recovers" $ do
     occupancy <- newOccupancyCounter
     condition <- newTVarIO False
     works <- newTVarIO False
@@ -141,66 +141,66 @@ spec = guarded . describe "monitor" $ do
             (atomically (writeTVar works True) >> pass over)
               `onException` (replicateM_ 3 yield >> atomically (writeTVar works False))
         recovery = inside occupancy (replicateM_ 3 yield >> atomically (writeTVar condition False))
-    launching (Signal.monitor (dialled condition) recovery task) $ \caller -> do
+    withThread (Signal.monitor (watchedVar condition) recovery task) $ \caller -> do
       for_ [1 .. 500 :: Int] $ \n -> do
         atomically (writeTVar condition True)
-        -- Two times of three the task may come to run.
+        -- Two times of three, wait until the task runs.
         unless (n `mod` 3 == 0) . atomically $
           (&&) <$> readTVar works <*> (not <$> readTVar condition) >>= check
       open over
       awaitEnd caller `shouldReturn` Gave ()
     mostInside occupancy `shouldReturn` 1
 
-  it "interrupts, as the outer one, the recovery of an inner one" $ do
-    book <- newLog
+  it "interrupts the recovery of another monitor that is inside its task" $ do
+    entries <- newLog
     danger <- newTestCondition False
     low <- newTestCondition True
     entered <- newGate
-    let flee = note book "flee" >> set danger (Says False)
+    let flee = note entries "flee" >> set danger (Value False)
         recharge = do
-          again <- (/= []) <$> notes book
-          note book "recharge"
-          unless again ((open entered >> hang) `onException` note book "unplug")
-          set low (Says False)
-        task = note book "task"
+          again <- (/= []) <$> notes entries
+          note entries "recharge"
+          unless again ((open entered >> hang) `onException` note entries "unplug")
+          set low (Value False)
+        task = note entries "task"
         inner = Signal.monitor (watched low) recharge task
-    launching (Signal.monitor (watched danger) flee inner) $ \caller -> do
+    withThread (Signal.monitor (watched danger) flee inner) $ \caller -> do
       pass entered
-      set danger (Says True)
+      set danger (Value True)
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["recharge", "unplug", "flee", "recharge", "task"]
+    notes entries `shouldReturn` ["recharge", "unplug", "flee", "recharge", "task"]
 
-  it "does not let an inner one interrupt the recovery of the outer one" $ do
-    book <- newLog
+  it "does not let a monitor inside its task interrupt its recovery" $ do
+    entries <- newLog
     danger <- newTestCondition False
     low <- newTestCondition False
     let flee = do
-          note book "flee"
-          set low (Says True)
-          note book "safe"
-          set danger (Says False)
-        recharge = note book "recharge" >> set low (Says False)
+          note entries "flee"
+          set low (Value True)
+          note entries "safe"
+          set danger (Value False)
+        recharge = note entries "recharge" >> set low (Value False)
         task = do
-          again <- (> 1) . length <$> notes book
-          note book "task"
-          unless again (set danger (Says True) >> hang)
+          again <- (> 1) . length <$> notes entries
+          note entries "task"
+          unless again (set danger (Value True) >> hang)
     Signal.monitor (watched danger) flee (Signal.monitor (watched low) recharge task)
-    notes book `shouldReturn` ["task", "flee", "safe", "recharge", "task"]
+    notes entries `shouldReturn` ["task", "flee", "safe", "recharge", "task"]
 
   for_ [minBound .. maxBound] $ \how ->
-    it ("is cancelled, when its recovery then " ++ manner how) $ do
-      book <- newLog
+    it ("is cancelled, and its recovery then " ++ manner how) $ do
+      entries <- newLog
       condition <- newTestCondition True
       entered <- newGate
       let recovery = void $ onStop how "recovery" (open entered >> hang)
-          act = leavingNothing (Signal.monitor (watched condition) recovery (note book "task"))
+          act = leavingNothing (Signal.monitor (watched condition) recovery (note entries "task"))
       cancelling act (pass entered) `shouldReturn` case how of
         Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "recovery"))
         _ -> CancelledBy (show (Cancel "the caller"))
-      notes book `shouldReturn` []
+      notes entries `shouldReturn` []
 
   it "does not recover when it is cancelled while the task stops" $ do
-    book <- newLog
+    entries <- newLog
     condition <- newTestCondition False
     entered <- newGate
     cleaning <- newGate
@@ -208,21 +208,21 @@ spec = guarded . describe "monitor" $ do
     let task =
           (open entered >> hang) `onException` do
             open cleaning
-            -- Interruptible; but nobody asks a second time.
+            -- Interruptible; but its stop is not requested a second time.
             pass release
-            note book "task is over"
-    launching (Signal.monitor (watched condition) (note book "recovery") task) $ \caller -> do
+            note entries "task is over"
+    withThread (Signal.monitor (watched condition) (note entries "recovery") task) $ \caller -> do
       pass entered
-      set condition (Says True)
+      set condition (Value True)
       pass cleaning
-      -- It is delivered when this returns: the caller waits where it can be interrupted.
+      -- The caller has received it when this returns: it blocks where it can be interrupted.
       throwTo (asyncThreadId caller) (Cancel "the caller")
       open release
       awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
-    notes book `shouldReturn` ["task is over"]
+    notes entries `shouldReturn` ["task is over"]
  where
   manner how = case how of
     Cleanly -> "stops"
-    Completing -> "completes all the same"
+    Completing -> "nevertheless completes"
     Failing -> "fails"
-    Faulting -> "faults: with both"
+    Faulting -> "faults: the exception holds both"

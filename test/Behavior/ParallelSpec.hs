@@ -26,58 +26,59 @@ spec = guarded $ do
     starting
     laws
   describe "firstOf and allOf" many
-  describe "All that has to stop" together
+  describe "Branches that have to stop" together
 
 -- Which outcome ---------------------------------------------------------------
 
--- | What becomes of a branch. The first three end by themselves; the others when
--- they are asked to stop.
-data Fate
+-- | What a branch does. With the first three plans it ends by itself; with the others
+-- when its stop is requested.
+data Plan
   = Completes
   | FailsAlone
   | FaultsAlone
   | Stops
   | StopsFailing
   | StopsFaulting
-  | CompletesAllTheSame
+  | CompletesWhenStopped
   deriving (Bounded, Enum, Eq, Show)
 
-instance Arbitrary Fate where
+instance Arbitrary Plan where
   arbitrary = arbitraryBoundedEnum
 
-saying :: Fate -> String
-saying = \case
+describePlan :: Plan -> String
+describePlan = \case
   Completes -> "succeeds"
   FailsAlone -> "fails"
   FaultsAlone -> "faults"
   Stops -> "is stopped"
   StopsFailing -> "is stopped and its cleanup fails"
   StopsFaulting -> "is stopped and its cleanup faults"
-  CompletesAllTheSame -> "is stopped but completes"
+  CompletesWhenStopped -> "is stopped but completes"
 
-endsAlone, isFaulty :: Fate -> Bool
+endsAlone, isFaulty :: Plan -> Bool
 endsAlone = (`elem` [Completes, FailsAlone, FaultsAlone])
 isFaulty = (`elem` [FaultsAlone, StopsFaulting])
 
--- | A branch, whose name is in all that it throws, and which gives a number.
-data Actor = Actor
+-- | A branch, whose name is in all exceptions that it throws, and whose result is a
+-- number.
+data TestBranch = TestBranch
   { name :: String
   , number :: Int
-  , fate :: Fate
+  , plan :: Plan
   }
   deriving (Show)
 
-actors :: [Fate] -> [Actor]
-actors = zipWith3 Actor (map (: []) ['a' ..]) [1 ..]
+testBranches :: [Plan] -> [TestBranch]
+testBranches = zipWith3 TestBranch (map (: []) ['a' ..]) [1 ..]
 
--- | What of the actors' ends ends the operator.
+-- | Which ends of branches end the operator.
 data Kind = Race | Gather | Nursery
 
 data Operator = Operator
   { called :: String
   , kind :: Kind
   , forcesTies :: Bool
-  -- ^ Whether it can be made to look only when it is to.
+  -- ^ Whether the test can determine when the operator first reads the outcomes.
   , members :: (String, String)
   , gives :: [Int] -> [Int]
   , apply :: [Behavior Int] -> Behavior [Int]
@@ -97,109 +98,109 @@ pairwise operator = \case
   left : right : _ -> [] <$ operator left right
   _ -> pure []
 
--- | The actors by whose own end the operator comes to its verdict.
-deciding :: Kind -> [Actor] -> [Actor]
-deciding Race = filter (endsAlone . fate)
-deciding Gather = filter ((`elem` [FailsAlone, FaultsAlone]) . fate)
+-- | The branches whose own end decides the operator's outcome.
+deciding :: Kind -> [TestBranch] -> [TestBranch]
+deciding Race = filter (endsAlone . plan)
+deciding Gather = filter ((`elem` [FailsAlone, FaultsAlone]) . plan)
 deciding Nursery = \case
-  body : forked -> filter (endsAlone . fate) [body] ++ deciding Gather forked
+  body : forked -> filter (endsAlone . plan) [body] ++ deciding Gather forked
   [] -> []
 
--- | Section 2 of the design, "Which outcome, when several things happened". All
--- that is there is there when the operator looks.
-predicted :: Kind -> Bool -> [Actor] -> Ending [Int]
-predicted which isCancelled cast =
-  case (isCancelled, [show (Fault (name a)) | a <- cast, isFaulty (fate a)]) of
+-- | Section 2 of the design, "Which outcome, when several things happened". Everything
+-- has happened before the operator reads the outcomes.
+predicted :: Kind -> Bool -> [TestBranch] -> Ending [Int]
+predicted which isCancelled branches =
+  case (isCancelled, [show (Fault (name a)) | a <- branches, isFaulty (plan a)]) of
     -- 1. Was the caller cancelled?
     (True, []) -> CancelledBy (show theCancel)
     (True, leftmost : _) -> CancelledWithFault (show theCancel) leftmost
     -- 2. Did a branch fault? The leftmost.
     (False, leftmost : _) -> FaultedWith leftmost
     -- 3. Did a branch complete or fail? On a tie the left one.
-    (False, _) -> case deciding which cast of
+    (False, _) -> case deciding which branches of
       decisive : _
-        | FailsAlone <- fate decisive -> FailedWith (show (Failure (name decisive)))
+        | FailsAlone <- plan decisive -> FailedWith (show (Failure (name decisive)))
         | otherwise -> Gave [number decisive]
-      [] -> Gave (map number cast)
+      [] -> Gave (map number branches)
 
 theCancel :: Cancel
 theCancel = Cancel "the caller"
 
--- | Whether the actors can meet such fates: somebody must stop those who have to be
--- stopped, and nobody can be cancelled for whom nothing is left to wait for.
-possible :: Kind -> Bool -> [Actor] -> Bool
-possible which isCancelled cast
+-- | Whether the plans can be carried out together: something must stop the branches that
+-- end only when stopped, and a caller can be cancelled only while it waits for a branch.
+possible :: Kind -> Bool -> [TestBranch] -> Bool
+possible which isCancelled branches
   | isCancelled = not allAlone
-  | otherwise = allAlone || not (null (deciding which cast))
+  | otherwise = allAlone || not (null (deciding which branches))
  where
-  allAlone = all (endsAlone . fate) cast
+  allAlone = all (endsAlone . plan) branches
 
--- | Whether it is a tie: then the operator must look when all of them have ended.
-isTie :: Kind -> [Actor] -> Bool
-isTie which cast = length (deciding which cast) > 1
+-- | Whether it is a tie: then the operator must read the outcomes when all have ended.
+isTie :: Kind -> [TestBranch] -> Bool
+isTie which branches = length (deciding which branches) > 1
 
--- | In which order those end who end by themselves.
+-- | The order in which those branches end that end by themselves.
 data Order = FromTheLeft | FromTheRight
   deriving (Bounded, Enum)
 
--- | Plays it, and says how the operator ended.
-enact :: Operator -> Bool -> [Actor] -> IO (Ending [Int])
-enact = enactIn FromTheLeft
+-- | Runs the operator on these branches, and returns how it ended.
+runBranches :: Operator -> Bool -> [TestBranch] -> IO (Ending [Int])
+runBranches = runBranchesIn FromTheLeft
 
--- | The same, and those who end by themselves do so in that order.
+-- | Like 'runBranches', with the order in which those branches end that end by themselves.
 --
--- Where ties can be forced ('forcesTies') the operator gets its behaviours in a list
--- whose end, which it comes to before it first looks, is there only when all have
--- ended who end by themselves. Otherwise they end in an order in which only the last
--- one decides. Those who are stopped wait, in their cleanup, until all of them have
--- heard of it, and the caller has still not returned; and if the caller is to be
--- cancelled as well as somebody decides, that is when it happens.
-enactIn :: Order -> Operator -> Bool -> [Actor] -> IO (Ending [Int])
-enactIn order operator isCancelled cast = do
-  stage <- forM cast $ \actor ->
-    (,,,) actor <$> newGate <*> newGate <*> newEmptyMVar
+-- Where ties can be forced ('forcesTies') the operator gets its behaviours in a lazy list.
+-- The operator evaluates the list to its end before it first reads the outcomes, and that
+-- end is available only when all branches that end by themselves have ended. Otherwise
+-- they end in an order in which only the last one decides. Stopped branches wait, in their
+-- cleanups, until all of them have received their stop requests and the caller has still
+-- not returned; if the caller is cancelled although a branch decides, it is cancelled then.
+runBranchesIn :: Order -> Operator -> Bool -> [TestBranch] -> IO (Ending [Int])
+runBranchesIn order operator isCancelled branches = do
+  gated <- forM branches $ \branch ->
+    (,,,) branch <$> newGate <*> newGate <*> newEmptyMVar
   mayEnd <- newGate
-  looking <- newGate
-  let act (actor, cue, cleaning, there) = case fate actor of
-        Completes -> alone (pure (number actor))
-        FailsAlone -> alone (throwIO (Failure (name actor)))
-        FaultsAlone -> alone (throwIO (Fault (name actor)))
+  mayRead <- newGate
+  let act (branch, mayGo, cleaning, there) = case plan branch of
+        Completes -> alone (pure (number branch))
+        FailsAlone -> alone (throwIO (Failure (name branch)))
+        FaultsAlone -> alone (throwIO (Fault (name branch)))
         Stops -> stopped throwIO
-        StopsFailing -> stopped (const (throwIO (Failure (name actor))))
-        StopsFaulting -> stopped (const (throwIO (Fault (name actor))))
-        CompletesAllTheSame -> stopped (const (pure (100 + number actor)))
+        StopsFailing -> stopped (const (throwIO (Failure (name branch))))
+        StopsFaulting -> stopped (const (throwIO (Fault (name branch))))
+        CompletesWhenStopped -> stopped (const (pure (100 + number branch)))
        where
-        alone end = enter >> pass cue >> end
+        alone end = enter >> pass mayGo >> end
         stopped end =
           (enter >> hang) `catch` \(e :: SomeAsyncException) -> do
             uninterruptibleMask_ (open cleaning >> pass mayEnd)
             end e
         enter = myThreadId >>= putMVar there
-      onStage = for_ stage $ \(_, _, _, there) -> readMVar there
-      endAlone which = for_ (ordered stage) $ \(actor, cue, _, there) ->
-        when (which actor) $ open cue >> readMVar there >>= awaitOver
+      awaitAllStarted = for_ gated $ \(_, _, _, there) -> readMVar there
+      endAlone which = for_ (ordered gated) $ \(branch, mayGo, _, there) ->
+        when (which branch) $ open mayGo >> readMVar there >>= awaitOver
       ordered = case order of
         FromTheLeft -> id
         FromTheRight -> reverse
-      isDeciding actor = name actor `elem` map name (deciding (kind operator) cast)
-      toBeStopped = [cleaning | (actor, _, cleaning, _) <- stage, not (endsAlone (fate actor))]
+      isDeciding branch = name branch `elem` map name (deciding (kind operator) branches)
+      toBeStopped = [cleaning | (branch, _, cleaning, _) <- gated, not (endsAlone (plan branch))]
   atTheEnd <- unsafeInterleaveIO $ do
-    onStage
-    endAlone (endsAlone . fate)
-    open looking
+    awaitAllStarted
+    endAlone (endsAlone . plan)
+    open mayRead
     pure []
   let list
-        | forcesTies operator = map act stage ++ atTheEnd
-        | otherwise = map act stage
-  launching (leavingNothing (apply operator list)) $ \caller -> do
+        | forcesTies operator = map act gated ++ atTheEnd
+        | otherwise = map act gated
+  withThread (leavingNothing (apply operator list)) $ \caller -> do
     if forcesTies operator
-      then pass looking
+      then pass mayRead
       else do
-        onStage
+        awaitAllStarted
         awaitIdle (asyncThreadId caller)
-        endAlone (\actor -> endsAlone (fate actor) && not (isDeciding actor))
+        endAlone (\branch -> endsAlone (plan branch) && not (isDeciding branch))
         endAlone isDeciding
-    let decided = any isDeciding cast
+    let decided = any isDeciding branches
     when (isCancelled && not decided) $ throwTo (asyncThreadId caller) theCancel
     unless (null toBeStopped) $ do
       traverse_ pass toBeStopped
@@ -208,38 +209,37 @@ enactIn order operator isCancelled cast = do
       open mayEnd
     awaitEnd caller
 
--- | An example for each cell of the table of fates.
+-- | An example for each cell of the table of plans.
 outcomes :: Operator -> Spec
 outcomes operator = describe (called operator) $ do
   for_ [(one, other, isCancelled) | one <- all', other <- all', isCancelled <- [False, True]] $
     \(one, other, isCancelled) -> do
-      let cast = actors [one, other]
-          end = case predicted (kind operator) isCancelled cast of
+      let branches = testBranches [one, other]
+          end = case predicted (kind operator) isCancelled branches of
             Gave numbers -> Gave (gives operator numbers)
             bad -> bad
-      when (possible (kind operator) isCancelled cast && (forcesTies operator || not (isTie (kind operator) cast))) $
+      when (possible (kind operator) isCancelled branches && (forcesTies operator || not (isTie (kind operator) branches))) $
         it (sentence one other isCancelled) $
-          for_ orders $ \order -> enactIn order operator isCancelled cast `shouldReturn` end
+          for_ orders $ \order -> runBranchesIn order operator isCancelled branches `shouldReturn` end
   when (forcesTies operator) $
-    it "ends as the design says, however many behaviours there are" $
+    it "ends as the design states, for any number of behaviours" $
       property $ \isCancelled ->
-        forAll (actors <$> (choose (1, 6) >>= \n -> vectorOf n arbitrary)) $ \cast ->
-          possible (kind operator) isCancelled cast
-            ==> ioProperty (allAre (predicted (kind operator) isCancelled cast) <$> traverse (\order -> enactIn order operator isCancelled cast) orders)
+        forAll (testBranches <$> (choose (1, 6) >>= \n -> vectorOf n arbitrary)) $ \branches ->
+          possible (kind operator) isCancelled branches
+            ==> ioProperty (allAre (predicted (kind operator) isCancelled branches) <$> traverse (\order -> runBranchesIn order operator isCancelled branches) orders)
  where
   orders = [minBound .. maxBound]
   allAre end = conjoin . map (=== end)
   all' = [minBound .. maxBound]
   sentence one other isCancelled =
-    fst (members operator) ++ " " ++ saying one ++ ", " ++ snd (members operator) ++ " " ++ saying other
+    fst (members operator) ++ " " ++ describePlan one ++ ", " ++ snd (members operator) ++ " " ++ describePlan other
       ++ (if isCancelled then ", and the caller is cancelled" else "")
 
--- | Nothing outside can make 'parallel', 'both' and 'scoped' look only when both behaviours
--- have ended. But with one capability, when one transaction wakes both, they come
--- before the caller in the queue of those who may run, unless the end of a time
--- slice falls between them. So it is a tie nearly always; an operator for which the
--- right one counts gives the other outcome nearly always. (For 'firstOf' and 'allOf'
--- ties are forced, above.)
+-- | A test cannot make 'parallel', 'both' and 'scoped' read the outcomes only when both
+-- behaviours have ended. But with one capability, when one transaction wakes both, they
+-- come before the caller in the run queue, unless a time slice ends between them. So
+-- nearly every round is a tie, and an operator for which the right one counts gives the
+-- other outcome in nearly every round. (For 'firstOf' and 'allOf' ties are forced, above.)
 ties :: Spec
 ties = do
   it "parallel: the left one's end counts when both have ended" $ do
@@ -250,7 +250,7 @@ ties = do
     mostly both (failWith "left") (failWith "right") (FailedWith (show (FailedBecause "left")))
   it "scoped: of those forked, the failure of the first forked counts when both have failed" $
     mostly forking (failWith "left") (failWith "right") (FailedWith (show (FailedBecause "left")))
-  it "parallel and both: also when both have ended before it is waited for" $
+  it "parallel and both: also when both have ended before the operator waits" $
     for_ [parallel, both] $ \operator -> onOneCapability $ do
       ends <- replicateM 50 (ending (operator (failWith "left") (failWith "right" :: IO ()) :: IO ()))
       length (filter (== FailedWith (show (FailedBecause "left"))) ends) `shouldSatisfy` (> 25)
@@ -261,12 +261,12 @@ ties = do
     ends <- replicateM 50 $ do
       leftThere <- newEmptyMVar
       rightThere <- newEmptyMVar
-      cue <- newGate
-      let act there final = myThreadId >>= putMVar there >> pass cue >> final
-      launching (operator (act leftThere left) (act rightThere right)) $ \caller -> do
+      mayGo <- newGate
+      let act there final = myThreadId >>= putMVar there >> pass mayGo >> final
+      withThread (operator (act leftThere left) (act rightThere right)) $ \caller -> do
         traverse readMVar [leftThere, rightThere] >>= traverse_ awaitIdle
         awaitIdle (asyncThreadId caller)
-        open cue
+        open mayGo
         awaitEnd caller
     length (filter (== end) ends) `shouldSatisfy` (> 25)
   onOneCapability act =
@@ -285,15 +285,15 @@ starting = do
   it "parallel ends when one has ended, whichever it is, and the other has been stopped" $
     for_ [id, flip] $ \turned -> do
       inside <- newGate
-      (end, done) <- observing $ \notebook ->
-        turned parallel ((open inside >> hang) `onException` note notebook "stopped") (pass inside)
+      (end, done) <- observing $ \entries ->
+        turned parallel ((open inside >> hang) `onException` note entries "stopped") (pass inside)
       (end, done) `shouldBe` (Gave (), ["stopped"])
 
   it "both ends when both have ended, whichever is the first" $
     for_ [id, flip] $ \turned -> do
       first <- newEmptyMVar
       second <- newGate
-      launching (turned both (myThreadId >>= putMVar first) (pass second)) $ \caller -> do
+      withThread (turned both (myThreadId >>= putMVar first) (pass second)) $ \caller -> do
         readMVar first >>= awaitOver
         stillRunning caller
         open second
@@ -307,59 +307,58 @@ starting = do
       ending (turned both first second) `shouldReturn` FailedWith (show (FailedBecause "first"))
 
   it "parallel and both start what they are given each time that they run" $ do
-    (_, done) <- observing $ \notebook -> do
-      let twice = both (note notebook 'l') (note notebook 'r')
+    (_, done) <- observing $ \entries -> do
+      let twice = both (note entries 'l') (note entries 'r')
       twice >> twice
     length done `shouldBe` 4
 
 laws :: Spec
 laws = do
   it "||| is parallel, looser than ? and tighter than >>" $ do
-    -- failed ? (act ||| hang) would be the same; (failed ? hang) ||| act tells.
-    observing (\notebook -> note notebook 'l' ? note notebook 'm' ||| hang >> note notebook 'r')
+    observing (\entries -> note entries 'l' ? note entries 'm' ||| hang >> note entries 'r')
       `shouldReturn` (Gave (), "lr")
-    observing (\notebook -> hang ||| failed ? note notebook 'm' >> note notebook 'r')
+    observing (\entries -> hang ||| failed ? note entries 'm' >> note entries 'r')
       `shouldReturn` (Gave (), "mr")
 
-  it "parallel is firstOf of two, and both allOf of two" $
-    forAllCasts $ \cast ->
+  it "parallel is firstOf of two" $
+    forAllBranches $ \branches ->
       (===)
-        <$> (voided <$> enact parallel' False cast)
-        <*> (voided <$> enact firstOf' False cast)
+        <$> (voided <$> runBranches parallel' False branches)
+        <*> (voided <$> runBranches firstOf' False branches)
   it "both is allOf of two" $
-    forAllCasts $ \cast ->
+    forAllBranches $ \branches ->
       (===)
-        <$> (voided <$> enact both' False cast)
-        <*> (voided <$> enact allOf' False cast)
+        <$> (voided <$> runBranches both' False branches)
+        <*> (voided <$> runBranches allOf' False branches)
 
-  it "parallel is symmetric except on ties" $ forAllCasts (symmetric parallel')
-  it "both is symmetric except on ties" $ forAllCasts (symmetric both')
+  it "parallel is symmetric except on ties" $ forAllBranches (symmetric parallel')
+  it "both is symmetric except on ties" $ forAllBranches (symmetric both')
 
-  it "parallel has a behaviour that never ends for its identity, but for the result" $
+  it "parallel has a behaviour that never ends as its identity, except for the result" $
     property $ \a ->
-      sameAs (\notebook -> play notebook a ||| hang) (\notebook -> void (play notebook a))
-        .&&. sameAs (\notebook -> hang ||| play notebook a) (\notebook -> void (play notebook a))
+      sameAs (\entries -> play entries a ||| hang) (\entries -> void (play entries a))
+        .&&. sameAs (\entries -> hang ||| play entries a) (\entries -> void (play entries a))
 
-  it "both has pure for its identity, but for the result" $
+  it "both has pure as its identity, except for the result" $
     property $ \a ->
-      sameAs (\notebook -> both (play notebook a) (pure ())) (\notebook -> void (play notebook a))
-        .&&. sameAs (\notebook -> both (pure ()) (play notebook a)) (\notebook -> void (play notebook a))
+      sameAs (\entries -> both (play entries a) (pure ())) (\entries -> void (play entries a))
+        .&&. sameAs (\entries -> both (pure ()) (play entries a)) (\entries -> void (play entries a))
 
   it "parallel and both are associative, when there is no tie" $
     property $ \a ->
       forAll (elements [0, 1, 2 :: Int]) $ \place ->
-        let among others notebook = [if n == place then void (play notebook a) else others | n <- [0 .. 2]]
+        let among others entries = [if n == place then void (play entries a) else others | n <- [0 .. 2]]
          in sameAs (foldl1 parallel . among hang) (foldr1 parallel . among hang)
               .&&. sameAs (foldl1 both . among (pure ())) (foldr1 both . among (pure ()))
  where
-  forAllCasts law =
-    forAll (actors <$> vectorOf 2 arbitrary) $ \cast ->
-      all (\which -> possible which False cast && not (isTie which cast)) [Race, Gather]
-        ==> ioProperty (law cast)
-  symmetric operator cast =
-    if length (filter (isFaulty . fate) cast) == 2
-      then pure (property True) -- the leftmost fault is a tie, too
-      else property <$> ((===) <$> enact operator False cast <*> enact operator False (reverse cast))
+  forAllBranches law =
+    forAll (testBranches <$> vectorOf 2 arbitrary) $ \branches ->
+      all (\which -> possible which False branches && not (isTie which branches)) [Race, Gather]
+        ==> ioProperty (law branches)
+  symmetric operator branches =
+    if length (filter (isFaulty . plan) branches) == 2
+      then pure (property True) -- two faults are a tie, too
+      else property <$> ((===) <$> runBranches operator False branches <*> runBranches operator False (reverse branches))
   voided = \case
     Gave _ -> Gave ()
     FailedWith e -> FailedWith e
@@ -371,20 +370,20 @@ laws = do
 
 many :: Spec
 many = do
-  it "firstOf fails on nothing, and allOf gives nothing" $ do
+  it "firstOf fails on an empty list, and allOf gives an empty list" $ do
     (firstOf [] :: IO ()) `shouldThrow` (== Failed)
     allOf [] `shouldReturn` ([] :: [()])
 
-  it "firstOf and allOf of one are that one" $
+  it "firstOf and allOf of one behaviour are that behaviour" $
     property $ \a ->
-      sameAs (\notebook -> firstOf [play notebook a]) (`play` a)
-        .&&. sameAs (\notebook -> allOf [play notebook a]) (\notebook -> pure <$> play notebook a)
+      sameAs (\entries -> firstOf [play entries a]) (`play` a)
+        .&&. sameAs (\entries -> allOf [play entries a]) (\entries -> pure <$> play entries a)
 
   it "firstOf gives the result of the first to end, wherever it is" $
     for_ [0 .. 9] $ \winner ->
       firstOf [if n == winner then pure n else hang | n <- [0 .. 9 :: Int]] `shouldReturn` winner
 
-  it "firstOf is satisfied with a failure, unless the behaviours have a ? of their own" $ do
+  it "firstOf ends with the first failure, unless the behaviours have a ? of their own" $ do
     ending (firstOf [hang, failed, hang :: IO ()]) `shouldReturn` FailedWith (show Failed)
     firstOf [failed ? hang, failed ? pure 'b', hang] `shouldReturn` 'b'
 
@@ -394,11 +393,11 @@ many = do
         gates <- replicateM 6 newGate
         threads <- replicateM 6 newEmptyMVar
         let act n = (myThreadId >>= putMVar (threads !! n)) >> pass (gates !! n) >> pure n
-        launching (allOf (map act [0 .. 5])) $ \caller -> do
+        withThread (allOf (map act [0 .. 5])) $ \caller -> do
           for_ order $ \n -> open (gates !! n) >> readMVar (threads !! n) >>= awaitOver
           (=== Gave [0 .. 5]) <$> awaitEnd caller
 
-  it "allOf keeps the shape of what it is given" $ do
+  it "allOf keeps the shape of its container" $ do
     allOf (Just (pure 'a')) `shouldReturn` Just 'a'
     allOf (Nothing :: Maybe (IO ())) `shouldReturn` Nothing
     allOf (Map.fromList [('a', pure 1), ('b', pure (2 :: Int))])
@@ -406,24 +405,24 @@ many = do
 
   it "allOf stops the rest at a failure, wherever it is" $
     for_ [0 .. 9] $ \loser -> do
-      (end, done) <- observing $ \notebook -> do
+      (end, done) <- observing $ \entries -> do
         others <- replicateM 9 newGate
         let act n
               | n == loser = traverse_ pass others >> failed
-              | otherwise = (open (others !! min n (n - fromEnum (n > loser))) >> hang) `onException` note notebook ()
+              | otherwise = (open (others !! min n (n - fromEnum (n > loser))) >> hang) `onException` note entries ()
         void (allOf (map act [0 .. 9]))
       (end, length done) `shouldBe` (FailedWith (show Failed), 9)
 
   it "firstOf and allOf run a thousand at the same time" $ do
     gates <- replicateM 1000 newGate
-    let everybodyIsThere n = open (gates !! n) >> pass (gates !! (999 - n)) >> pure n
-    allOf (map everybodyIsThere [0 .. 999]) `shouldReturn` [0 .. 999]
+    let awaitOpposite n = open (gates !! n) >> pass (gates !! (999 - n)) >> pure n
+    allOf (map awaitOpposite [0 .. 999]) `shouldReturn` [0 .. 999]
     firstOf (replicate 999 hang ++ [pure 'z']) `shouldReturn` 'z'
 
 -- All that has to stop --------------------------------------------------------
 
--- | Each operator with so many hanging branches, which all run when the gates that
--- they open are open.
+-- | Each operator with the number of hanging branches that it gets, all of which run when
+-- the gates that they open are open.
 groups :: [(String, Int, [Behavior ()] -> Behavior ())]
 groups =
   [ ("parallel", 2, foldr1 parallel)
@@ -436,35 +435,35 @@ groups =
 together :: Spec
 together = do
   for_ groups $ \(operator, size, apply') ->
-    it (operator ++ ": hears of it at once, so that cleanups can wait for each other") $ do
+    it (operator ++ ": all stop requests are made at once, so that cleanups can wait for each other") $ do
       inside <- replicateM size newGate
-      heard <- replicateM size newGate
+      received <- replicateM size newGate
       let act n =
             uninterruptibly (open (inside !! n) >> hang) $
-              open (heard !! n) >> traverse_ pass heard
+              open (received !! n) >> traverse_ pass received
       cancelling (apply' (map act [0 .. size - 1])) (traverse_ pass inside)
         `shouldReturn` CancelledBy (show theCancel)
 
   for_ groups $ \(operator, size, apply') ->
-    it (operator ++ ": hears of it also if one of them cannot be interrupted just now") $
-      for_ [0 .. size - 1] $ \deaf -> do
+    it (operator ++ ": the others receive their stop requests while one is uninterruptible") $
+      for_ [0 .. size - 1] $ \uninterruptible -> do
         inside <- replicateM size newGate
-        heard <- replicateM size newGate
+        received <- replicateM size newGate
         let act n
-              | n == deaf = do
+              | n == uninterruptible = do
                   uninterruptibleMask_ $ open (inside !! n) >> for_ (others n) pass
                   hang
-              | otherwise = (open (inside !! n) >> hang) `onException` open (heard !! n)
-            others n = [gate | (k, gate) <- zip [0 ..] heard, k /= n]
+              | otherwise = (open (inside !! n) >> hang) `onException` open (received !! n)
+            others n = [gate | (k, gate) <- zip [0 ..] received, k /= n]
         cancelling (apply' (map act [0 .. size - 1])) (traverse_ pass inside)
           `shouldReturn` CancelledBy (show theCancel)
 
   for_ groups $ \(operator, size, apply') ->
-    it (operator ++ ": hears of it at once when one of them ends the operator") $ do
+    it (operator ++ ": all stop requests are made at once when one branch ends the operator") $ do
       inside <- replicateM size newGate
-      heard <- replicateM size newGate
+      received <- replicateM size newGate
       let act 0 = traverse_ pass (drop 1 inside) >> failed
           act n =
             uninterruptibly (open (inside !! n) >> hang) $
-              open (heard !! n) >> traverse_ pass (drop 1 heard)
+              open (received !! n) >> traverse_ pass (drop 1 received)
       ending (apply' (map act [0 .. size - 1])) `shouldReturn` FailedWith (show Failed)

@@ -1,9 +1,9 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- The paper's 'rSelect' and 'monitor', on a test that is polled. They are the operators
--- of "Behavior.Signal" on such a signal; so here are the laws, the promises once each,
--- and a caller that is cancelled in every phase that there is.
+-- The paper's 'rSelect' and 'monitor', on a polled test. They are the operators of
+-- "Behavior.Signal" on a polled signal; so this spec has the laws, each promise once, and
+-- a caller that is cancelled in every phase.
 module Behavior.PolledSpec (spec) where
 
 import Control.Concurrent.Async (asyncThreadId)
@@ -43,7 +43,7 @@ laws = do
      in with rSelect `sameAs` with (Signal.rSelect . Signal.polling 0.01)
   prop "monitor is Signal.monitor on a polled signal" $ \test r t ->
     let with monitors n = do
-          -- The test holds once at most, or it could go on for ever.
+          -- The test holds at most once; otherwise this might not end.
           once <- newTVarIO True
           let holds = do
                 first <- atomically (readTVar once <* writeTVar once False)
@@ -58,57 +58,57 @@ either' = [("rSelect", rSelect), ("monitor", \test main other -> monitor (not <$
 common :: Spec
 common = for_ either' $ \(name, run) -> do
   it (name ++ " reads its test before anything starts") $ do
-    book <- newLog
+    entries <- newLog
     entered <- newGate
     release <- newGate
-    let test = open entered >> pass release >> note book "read" >> pure True
-    launching (run test (note book "main") (note book "other")) $ \caller -> do
+    let test = open entered >> pass release >> note entries "read" >> pure True
+    withThread (run test (note entries "main") (note entries "other")) $ \caller -> do
       pass entered
       stillRunning caller
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    take 2 <$> notes book `shouldReturn` ["read", "main"]
+    take 2 <$> notes entries `shouldReturn` ["read", "main"]
 
-  it (name ++ " reads its test again and again, at least 10 ms apart") $ do
+  it (name ++ " reads its test repeatedly, at least 10 ms apart") $ do
     times <- newLog
     let test = True <$ (now >>= note times)
     since <- now
-    launching (run test hang (pure ())) $ \_ -> eventually ((>= 6) . length <$> notes times)
+    withThread (run test hang (pure ())) $ \_ -> eventually ((>= 6) . length <$> notes times)
     began <- notes times
     zip [0 ..] began `shouldSatisfy` all (\(n, t) -> t - since >= fromIntegral (n :: Int) * 0.01)
 
-  it (name ++ " never has both behaviours running, and each time what the test says") $ do
+  it (name ++ " never runs both behaviours at the same time, and each time the one that the test selects") $ do
     occupancy <- newOccupancyCounter
     condition <- newTVarIO True
     running' <- newTVarIO Nothing
     let branch own = inside occupancy $ atomically (writeTVar running' (Just own)) >> hang
-    launching (run (readTVarIO condition) (branch True) (branch False)) $ \_ ->
+    withThread (run (readTVarIO condition) (branch True) (branch False)) $ \_ ->
       -- 'monitor' does not end its recovery for a test that changes.
-      for_ (take (if name == "monitor" then 1 else 10) (cycle [False, True])) $ \says' -> do
-        atomically (writeTVar condition says')
-        atomically (readTVar running' >>= check . (== Just says'))
+      for_ (take (if name == "monitor" then 1 else 10) (cycle [False, True])) $ \holds -> do
+        atomically (writeTVar condition holds)
+        atomically (readTVar running' >>= check . (== Just holds))
     mostInside occupancy `shouldReturn` 1
 
-  it (name ++ " keeps the result of a behaviour that completed though asked to stop") $ do
-    book <- newLog
+  it (name ++ " keeps the result of a behaviour that completed although its stop was requested") $ do
+    entries <- newLog
     entered <- newGate
-    let main = void (onStop Completing "main" (open entered >> hang)) >> note book "main"
-    run (not <$> opened entered) main (note book "other")
-    notes book `shouldReturn` ["main"]
+    let main = void (onStop Completing "main" (open entered >> hang)) >> note entries "main"
+    run (not <$> opened entered) main (note entries "other")
+    notes entries `shouldReturn` ["main"]
 
   for_ [("fails", throwIO Failed, FailedWith "Failed"), ("faults", throwIO (Fault "bug"), FaultedWith (show (Fault "bug")))] $
     \(manner, act, end) ->
-      it (name ++ " does not take for false a test that " ++ manner) $ do
-        book <- newLog
+      it (name ++ " does not treat as false a test that " ++ manner) $ do
+        entries <- newLog
         entered <- newGate
         let test = opened entered >>= \isEntered -> if isEntered then act else pure True
-            main = (open entered >> hang) `onException` note book "main is over"
-        ending (run test main (note book "other")) `shouldReturn` end
-        notes book `shouldReturn` ["main is over"]
+            main = (open entered >> hang) `onException` note entries "main is over"
+        ending (run test main (note entries "other")) `shouldReturn` end
+        notes entries `shouldReturn` ["main is over"]
 
   for_ [("unmasked", id), ("masked", mask_), ("uninterruptible", uninterruptibleMask_)] $
     \(state, masked) ->
-      it (name ++ " runs all unmasked for a caller that is " ++ state) $ do
+      it (name ++ " runs test and behaviours unmasked for a caller that is " ++ state) $ do
         states <- newLog
         entered <- newGate
         recovered <- newGate
@@ -119,31 +119,31 @@ common = for_ either' $ \(name, run) -> do
         masked (run test main other)
         notes states >>= (`shouldSatisfy` \all' -> length all' > 3 && all (== Unmasked) all')
 
-  it (name ++ " is no failure, but cancelled, under a failingOn for every exception") $ do
-    book <- newLog
+  it (name ++ " is cancelled, and does not fail, under a failingOn for every exception") $ do
+    entries <- newLog
     entered <- newGate
     let everything = failingOn (\(_ :: SomeException) -> True)
-        act = everything (run (pure True) (open entered >> hang) (pure ())) ? note book "went on"
+        act = everything (run (pure True) (open entered >> hang) (pure ())) ? note entries "went on"
     cancelling act (pass entered) `shouldReturn` CancelledBy (show (Cancel "the caller"))
-    ending (timeout 0.001 (everything (run (pure True) hang (pure ())) ? note book "went on"))
+    ending (timeout 0.001 (everything (run (pure True) hang (pure ())) ? note entries "went on"))
       `shouldReturn` FailedWith "TimedOut 0.001"
-    System.Timeout.timeout 1000 (everything (run (pure True) hang (pure ())) ? note book "went on")
+    System.Timeout.timeout 1000 (everything (run (pure True) hang (pure ())) ? note entries "went on")
       `shouldReturn` Nothing
-    notes book `shouldReturn` []
+    notes entries `shouldReturn` []
 
 selecting :: Spec
 selecting = do
-  it "starts what the test says when the old branch has ended, not when it changed" $ do
-    book <- newLog
+  it "starts the branch that the test selects when the old one has ended, not when the test changed" $ do
+    entries <- newLog
     condition <- newTVarIO True
     let left = do
-          again <- (/= []) <$> notes book
-          note book "left"
+          again <- (/= []) <$> notes entries
+          note entries "left"
           unless again $
             (atomically (writeTVar condition False) >> hang)
               `onException` atomically (writeTVar condition True)
-    rSelect (readTVarIO condition) left (note book "right")
-    notes book `shouldReturn` ["left", "left"]
+    rSelect (readTVarIO condition) left (note entries "right")
+    notes entries `shouldReturn` ["left", "left"]
 
   it "labels its threads" $ do
     condition <- newTVarIO True
@@ -152,35 +152,35 @@ selecting = do
 
 monitoring :: Spec
 monitoring = do
-  it "recharges, begins the task from its beginning, and fulfils it" $ do
-    book <- newLog
+  it "recharges, restarts the task, and completes it" $ do
+    entries <- newLog
     battery <- newTVarIO (15 :: Int)
     let drive = do
-          note book "enter room"
+          note entries "enter room"
           level <- atomically (modifyTVar' battery (subtract 8) >> readTVar battery)
           -- On low battery the robot gets no further.
           when (level < 10) hang
-        recharge = note book "recharge" >> atomically (writeTVar battery 100)
-    monitor ((< 10) <$> readTVarIO battery) recharge (drive >> note book "perform task")
-    notes book `shouldReturn` ["enter room", "recharge", "enter room", "perform task"]
+        recharge = note entries "recharge" >> atomically (writeTVar battery 100)
+    monitor ((< 10) <$> readTVarIO battery) recharge (drive >> note entries "perform task")
+    notes entries `shouldReturn` ["enter room", "recharge", "enter room", "perform task"]
 
   it "recovers even if the test is false again when the task has ended" $ do
-    book <- newLog
+    entries <- newLog
     low <- newTVarIO False
     let task = do
-          again <- (/= []) <$> notes book
-          note book "task"
+          again <- (/= []) <$> notes entries
+          note entries "task"
           unless again $
             (atomically (writeTVar low True) >> hang)
               `onException` atomically (writeTVar low False)
-    monitor (readTVarIO low) (note book "recovery") task
-    notes book `shouldReturn` ["task", "recovery", "task"]
+    monitor (readTVarIO low) (note entries "recovery") task
+    notes entries `shouldReturn` ["task", "recovery", "task"]
 
   it "does not read its test while it recovers" $ do
     resting <- newGate
     level <- newSensor (pure . (== 1))
     let recovery = do
-          -- The thread that reads has ended; it takes a new one to read again.
+          -- The thread that reads has ended; only a new one could read again.
           pass resting
           earlier <- readings level
           aWhile 0.002
@@ -207,9 +207,10 @@ startedBy act = do
 -- | What an operator is doing.
 data Phase = Phase String (Probe -> Behavior ())
 
--- | What runs in a phase, by its name: it tells the test that the phase is reached, and
--- then waits to be stopped; or it is already, and this is its cleanup, which waits until
--- the test lets it end.
+-- | What runs in a phase, with its name. 'runs' signals to the test that the phase is
+-- reached, and then waits to be stopped. 'cleansUp' is the cleanup of a branch that is
+-- being stopped: it also signals that the phase is reached, and then waits until the test
+-- lets it end.
 data Probe = Probe
   { runs :: String -> Behavior ()
   , cleansUp :: String -> Behavior ()
@@ -252,37 +253,37 @@ phases =
 cancelled :: Spec
 cancelled =
   for_ phases $ \(Phase when' act) -> do
-    it ("while " ++ when' ++ ", is cancelled when that has ended") $ do
+    it ("while " ++ when' ++ ", ends as cancelled when what ran has ended") $ do
       (end, ran) <- cancelledWhile act Cleanly
       end `shouldBe` CancelledBy (show (Cancel "the caller"))
       length ran `shouldBe` 1
-    it ("while " ++ when' ++ ", is told of the fault of what was stopped") $ do
+    it ("while " ++ when' ++ ", ends as cancelled with the fault of what was stopped") $ do
       (end, ran) <- cancelledWhile act Faulting
       end `shouldBe` CancelledWithFault (show (Cancel "the caller")) (show (Fault (concat ran)))
 
 -- | How the operator ended, and the names of what had ended by then.
 cancelledWhile :: (Probe -> Behavior ()) -> Stopping -> IO (Ending (), [String])
 cancelledWhile act how = do
-  book <- newLog
+  entries <- newLog
   reached <- newGate
   release <- newGate
   let probe =
         Probe
-          { runs = \name -> void (onStop how name (open reached >> hang)) `finally` note book name
+          { runs = \name -> void (onStop how name (open reached >> hang)) `finally` note entries name
           , cleansUp = \name -> do
               open reached
               pass release
-              note book name
+              note entries name
               when (how == Faulting) (throwIO (Fault name))
           }
-      -- What has ended when the operator has, not later.
-      caller = leavingNothing (act probe) `onException` note book "the operator"
-  end <- launching caller $ \thread -> do
+      -- The log then shows what had ended when the operator ended, and nothing later.
+      caller = leavingNothing (act probe) `onException` note entries "the operator"
+  end <- withThread caller $ \thread -> do
     pass reached
-    -- It is delivered when this returns: the caller waits where it can be interrupted.
+    -- The caller has received it when this returns: it blocks where it can be interrupted.
     throwTo (asyncThreadId thread) (Cancel "the caller")
     open release
     awaitEnd thread
-  ran <- notes book
+  ran <- notes entries
   drop (length ran - 1) ran `shouldBe` ["the operator"]
   pure (end, init ran)

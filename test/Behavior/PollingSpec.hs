@@ -1,9 +1,9 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- 'Signal.polling': when a sensor is read, by whom, and what counts. The readings drive
--- these tests: each counts, waits at a gate or asks the clock. Those that go wrong have
--- a spec of their own.
+-- 'Signal.polling': when a sensor is read, by which thread, and which readings decide. The
+-- readings drive these tests: each counts, waits at a gate or reads the clock. Readings that
+-- go wrong have a spec of their own.
 module Behavior.PollingSpec (spec) where
 
 import Control.Concurrent (myThreadId)
@@ -24,13 +24,13 @@ import Watched
 spec :: Spec
 spec = guarded $ do
   describe "polling, when it reads:" slots
-  describe "polling, what counts:" counting
+  describe "polling, which readings decide:" deciding
   describe "polling, around a recovery:" recovering
 
 -- | The moments at which readings began and ended, the first reading first.
 type Times = Log (Seconds, Seconds)
 
--- | A sensor that notes when it was read.
+-- | A sensor that adds to a log when it was read.
 timed :: Times -> (Int -> Behavior a) -> IO (Sensor a)
 timed times act = newSensor $ \n -> do
   began <- now
@@ -40,8 +40,8 @@ timed times act = newSensor $ \n -> do
 
 -- | No reading began less than a period after the one before.
 --
--- The clock shows a reading's own idea of when it began, which is a little after it
--- did: so what is compared is the end of the last but one.
+-- A reading reads the clock a little after it has begun; so its beginning is compared with
+-- the end of the last reading but one.
 apart :: Seconds -> [(Seconds, Seconds)] -> Expectation
 apart period times =
   [gap | ((_, ended), (began, _)) <- zip times (drop 2 times), let gap = began - ended, gap < period]
@@ -64,12 +64,12 @@ slots = do
 
   it "a reading that is late does not delay the slots after it" $
     for_ [1 .. 5] $ \seed -> do
-      book <- newLog
-      let late = Signal.polling 0.01 (False <$ note book ())
+      entries <- newLog
+      let late = Signal.polling 0.01 (False <$ note entries ())
       _ <- simulateWith defaults {slip = 0.004, scheduled = Seeded seed} (Signal.monitor late (pure ()) (sleep 5 ||| forever (sleep 0.0031)))
-      notes book >>= (`shouldSatisfy` (`elem` [500, 501])) . length
+      notes entries >>= (`shouldSatisfy` (`elem` [500, 501])) . length
 
-  it "a slow reading skips the slots that it missed, and is not made up for" $ do
+  it "after a slow reading the slots that it missed are skipped, and not made up for" $ do
     times <- newLog
     level <- timed times $ \n -> do
       began <- now
@@ -93,7 +93,7 @@ slots = do
     moments <- newLog
     alarm <- newTVarIO False
     let reading = now >>= note moments >> sleep 3
-        signal = const <$> dialled alarm <*> Signal.polling 10 reading
+        signal = const <$> watchedVar alarm <*> Signal.polling 10 reading
         change = sleep 11 >> atomically (writeTVar alarm True) >> hang
     _ <- simulate (Signal.monitor signal (atomically (writeTVar alarm False)) (sleep 15) ||| change)
     notes moments `shouldReturn` [0, 10, 20, 30]
@@ -121,14 +121,14 @@ slots = do
 
   for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN"), (5e-324, "5.0e-324"), (0.0000009, "0.0000009")] $ \(period, shown) -> do
     it ("a period of " ++ shown ++ " is refused, and nothing starts") $ do
-      book <- newLog
-      let signal = Signal.polling period (True <$ note book "reading")
-      ending (Signal.rSelect signal (note book "left") (note book "right"))
+      entries <- newLog
+      let signal = Signal.polling period (True <$ note entries "reading")
+      ending (Signal.rSelect signal (note entries "left") (note entries "right"))
         `shouldReturn` FaultedWith ("polling: a period is at least 0.000001 seconds, not " ++ shown)
-      notes book `shouldReturn` []
+      notes entries `shouldReturn` []
 
-counting :: Spec
-counting = do
+deciding :: Spec
+deciding = do
   it "the first reading decides, however long the period" $
     -- With no second reading to wait for, an operator that missed it would wait for ever.
     replicateM_ 500 $
@@ -136,29 +136,29 @@ counting = do
         `shouldReturn` "l"
 
   it "nothing starts before the first reading has ended" $ do
-    book <- newLog
+    entries <- newLog
     entered <- newGate
     release <- newGate
     level <- newSensor $ \_ -> do
       open entered
       pass release
-      note book "read"
+      note entries "read"
       pure True
-    launching (Signal.rSelect (sensing level) (note book "left") (note book "right")) $ \caller -> do
+    withThread (Signal.rSelect (sensing level) (note entries "left") (note entries "right")) $ \caller -> do
       pass entered
       stillRunning caller
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    take 2 <$> notes book `shouldReturn` ["read", "left"]
+    take 2 <$> notes entries `shouldReturn` ["read", "left"]
 
   it "after a branch has ended a reading is awaited that began after that" $ do
-    book <- newLog
+    entries <- newLog
     mode <- newTVarIO 'a'
     started <- newGate
     hanging <- newGate
     release <- newGate
-    -- The readings after the first branch has started: the first of them hangs, and
-    -- sees what was there before that branch was stopped.
+    -- The readings after the first branch has started: the first of them hangs, and its
+    -- value is from before that branch was stopped.
     later <- newTVarIO (0 :: Int)
     level <- newSensor $ \_ -> do
       isStarted <- opened started
@@ -168,37 +168,37 @@ counting = do
           n <- atomically (modifyTVar' later (+ 1) >> readTVar later)
           when (n == 1) (open hanging >> pass release)
           pure (if n == 1 then "begun before" else "begun after")
-    let branch ('a', _) = open started >> hang `onException` note book "a is over"
-        branch (key, seen) = note book (key : ": " ++ seen)
-    launching (Signal.switch ((,) <$> dialled mode <*> sensing level) branch) $ \caller -> do
+    let branch ('a', _) = open started >> hang `onException` note entries "a is over"
+        branch (key, seen) = note entries (key : ": " ++ seen)
+    withThread (Signal.switch ((,) <$> watchedVar mode <*> sensing level) branch) $ \caller -> do
       pass hanging
       atomically (writeTVar mode 'b')
-      eventually ((== ["a is over"]) <$> notes book)
+      eventually ((== ["a is over"]) <$> notes entries)
       stillRunning caller
-      note book "the reading ends"
+      note entries "the reading ends"
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["a is over", "the reading ends", "b: begun after"]
+    notes entries `shouldReturn` ["a is over", "the reading ends", "b: begun after"]
 
-  it "a change that is over when the old branch has ended starts that branch anew" $ do
-    book <- newLog
+  it "a change that is undone when the old branch has ended restarts that branch" $ do
+    entries <- newLog
     closed <- newTVarIO True
     level <- newSensor (const (readTVarIO closed))
     let left =
-          notes book >>= \earlier -> do
-            note book "left"
+          notes entries >>= \earlier -> do
+            note entries "left"
             when (null earlier) $
               (atomically (writeTVar closed False) >> hang)
                 `onException` atomically (writeTVar closed True)
-    Signal.rSelect (sensing level) left (note book "right")
-    notes book `shouldReturn` ["left", "left"]
+    Signal.rSelect (sensing level) left (note entries "right")
+    notes entries `shouldReturn` ["left", "left"]
 
-  it "with several sources, a change of one counts at once, though another is read but once" $ do
+  it "with several sources, a change of one has effect at once, though another is read only once" $ do
     alarm <- newTVarIO False
     raised <- newGate
     recovered <- newGate
-    let signal = (||) <$> dialled alarm <*> Signal.polling (1 / 0) (pure False)
-    launching (Signal.monitor signal (open recovered) (open raised >> hang)) $ \_ -> do
+    let signal = (||) <$> watchedVar alarm <*> Signal.polling (1 / 0) (pure False)
+    withThread (Signal.monitor signal (open recovered) (open raised >> hang)) $ \_ -> do
       pass raised
       atomically (writeTVar alarm True)
       pass recovered
@@ -218,19 +218,19 @@ counting = do
       `shouldReturn` [f (Label "waitUntil" "polling") | f <- [Started, Ended]]
     map length . group <$> notes threads `shouldReturn` [6]
 
--- | A monitor that has a polled sensor and an alarm, which alone decides; whose task
--- is under way, and whose sensor is just being read, once the gate is open. From then
--- on each reading does as the test says, by its number from 1.
+-- | A monitor on an alarm, which alone decides, and a polled sensor. Once the gate is open
+-- the task runs and a reading is in flight. From then on each reading does what the given
+-- function gives for its number from 1.
 data Scene = Scene
   { history :: Log String
   , trigger :: TVar Bool
-  , underWay :: Gate
+  , readingInFlight :: Gate
   , monitoring :: Behavior ()
   }
 
 scene :: (Gate -> Int -> Behavior ()) -> IO Scene
 scene act = do
-  notebook <- newLog
+  entries <- newLog
   variable <- newTVarIO False
   started <- newGate
   entered <- newGate
@@ -240,22 +240,22 @@ scene act = do
     when isStarted $ atomically (modifyTVar' later (+ 1) >> readTVar later) >>= act entered
   let task = do
         again <- opened started
-        note notebook "task"
+        note entries "task"
         unless again (open started >> hang)
       recovery = do
         atomically (writeTVar variable False)
-        note notebook "recovery"
+        note entries "recovery"
   pure
     Scene
-      { history = notebook
+      { history = entries
       , trigger = variable
-      , underWay = entered
-      , monitoring = Signal.monitor (const <$> dialled variable <*> sensing level) recovery task
+      , readingInFlight = entered
+      , monitoring = Signal.monitor (const <$> watchedVar variable <*> sensing level) recovery task
       }
 
--- | Raises the alarm while a reading is under way.
+-- | Raises the alarm while a reading is in flight.
 raise :: Scene -> IO ()
-raise s = pass (underWay s) >> atomically (writeTVar (trigger s) True)
+raise s = pass (readingInFlight s) >> atomically (writeTVar (trigger s) True)
 
 recovering :: Spec
 recovering = do
@@ -264,7 +264,7 @@ recovering = do
     low <- newTVarIO True
     level <- newSensor (const (readTVarIO low))
     let recovery = do
-          -- From here on the poller is no more.
+          -- The thread that polls has ended.
           pass resting
           earlier <- readings level
           aWhile 0.001
@@ -283,10 +283,10 @@ recovering = do
       atomically (writeTVar low False)
     readTVarIO recoveries `shouldReturn` 1
 
-  it "the recovery does not wait for a slow reading, but what comes after it does" $ do
+  it "the recovery does not wait for a slow reading, but the task after it does" $ do
     release <- newGate
     s <- scene $ \entered n -> when (n == 1) . uninterruptibleMask_ $ open entered >> pass release
-    launching (monitoring s) $ \caller -> do
+    withThread (monitoring s) $ \caller -> do
       raise s
       eventually ((== ["task", "recovery"]) <$> notes (history s))
       stillRunning caller
@@ -296,56 +296,56 @@ recovering = do
     notes (history s) `shouldReturn` ["task", "recovery", "the reading ends", "task"]
 
   it "a recovery that comes before any task does not wait for a slow reading either" $ do
-    book <- newLog
+    entries <- newLog
     low <- newTVarIO Nothing
     entered <- newGate
     release <- newGate
     level <- newSensor $ \n ->
       when (n == 2) . uninterruptibleMask_ $ open entered >> pass release
     let signal = const <$> Signal.watching (readTVar low >>= maybe retry pure) <*> sensing level
-        recovery = note book "recovery" >> atomically (writeTVar low (Just False))
-    launching (Signal.monitor signal recovery (note book "task")) $ \caller -> do
+        recovery = note entries "recovery" >> atomically (writeTVar low (Just False))
+    withThread (Signal.monitor signal recovery (note entries "task")) $ \caller -> do
       pass entered
       atomically (writeTVar low (Just True))
-      eventually ((== ["recovery"]) <$> notes book)
+      eventually ((== ["recovery"]) <$> notes entries)
       stillRunning caller
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["recovery", "task"]
+    notes entries `shouldReturn` ["recovery", "task"]
 
-  it "task and reading are asked to stop at once: the one hears it while the other is deaf" $ do
+  it "the stops of task and reading are requested at once: the reading stops while the task is uninterruptible" $ do
     alarm <- newTVarIO False
     started <- newGate
     entered <- newGate
-    heard <- newGate
+    received <- newGate
     release <- newGate
     level <- newSensor $ \_ -> do
       isStarted <- opened started
-      over <- opened heard
-      when (isStarted && not over) $ (open entered >> hang) `onException` open heard
+      over <- opened received
+      when (isStarted && not over) $ (open entered >> hang) `onException` open received
     let task = do
           again <- opened started
           unless again $ uninterruptibleMask_ (open started >> pass release)
         recovery = atomically (writeTVar alarm False)
-    launching (Signal.monitor (const <$> dialled alarm <*> sensing level) recovery task) $ \caller -> do
+    withThread (Signal.monitor (const <$> watchedVar alarm <*> sensing level) recovery task) $ \caller -> do
       pass entered
       atomically (writeTVar alarm True)
-      pass heard
+      pass received
       open release
       awaitEnd caller `shouldReturn` Gave ()
 
-  it "a reading that swallows the request to stop does not keep the monitor from going on" $ do
+  it "a reading that catches its stop request and returns does not prevent the monitor from continuing" $ do
     s <- scene $ \entered n ->
       when (n == 1) $ (open entered >> hang) `catch` \(_ :: SomeAsyncException) -> pure ()
-    launching (monitoring s) $ \caller -> do
+    withThread (monitoring s) $ \caller -> do
       raise s
       awaitEnd caller `shouldReturn` Gave ()
     notes (history s) `shouldReturn` ["task", "recovery", "task"]
 
   for_ [Failing, Faulting] $ \how ->
-    it ("a reading that is " ++ show how ++ " while it stops, and then the recovery") $ do
+    it ("a reading that is " ++ show how ++ " while it stops does not prevent the recovery") $ do
       s <- scene $ \entered n -> when (n == 1) . void $ onStop how "reading" (open entered >> hang)
-      launching (monitoring s) $ \caller -> do
+      withThread (monitoring s) $ \caller -> do
         raise s
         end <- awaitEnd caller
         ran <- notes (history s)

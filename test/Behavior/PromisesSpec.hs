@@ -1,7 +1,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- What is promised of every operator, in every place where one runs a behaviour.
+-- The promises of every operator, in every place where an operator runs a behaviour.
 module Behavior.PromisesSpec (spec) where
 
 import Control.Concurrent
@@ -38,33 +38,33 @@ isCancelled = CancelledBy (show theCancel)
 cancelled :: Spec
 cancelled = do
   inEach places "throws the same exception when what it ran has ended, however slow its cleanup" $ \place -> do
-    notebook <- newLog
+    entries <- newLog
     inside <- newGate
     cleaning <- newGate
     mayEnd <- newGate
     let act = uninterruptibly (open inside >> hang) $ do
           open cleaning
           pass mayEnd
-          note notebook "cleaned up"
-    launching (leavingNothing (placed place act)) $ \caller -> do
+          note entries "cleaned up"
+    withThread (leavingNothing (placed place act)) $ \caller -> do
       pass inside
       throwTo (asyncThreadId caller) theCancel
       pass cleaning
       stillRunning caller
       open mayEnd
       awaitEnd caller `shouldReturn` isCancelled
-      notes notebook `shouldReturn` ["cleaned up"]
+      notes entries `shouldReturn` ["cleaned up"]
 
-  inEach places "does not leave what it ran when it is cancelled again, and again, meanwhile" $ \place -> do
-    notebook <- newLog
+  inEach places "waits for what it ran also when it is cancelled again, and again, meanwhile" $ \place -> do
+    entries <- newLog
     inside <- newGate
     cleaning <- newGate
     mayEnd <- newGate
     let act = uninterruptibly (open inside >> hang) $ do
           open cleaning
           pass mayEnd
-          note notebook "cleaned up"
-    launching (leavingNothing (placed place act)) $ \caller -> do
+          note entries "cleaned up"
+    withThread (leavingNothing (placed place act)) $ \caller -> do
       pass inside
       throwTo (asyncThreadId caller) theCancel
       pass cleaning
@@ -73,10 +73,10 @@ cancelled = do
       stillRunning caller
       open mayEnd
       awaitEnd caller `shouldReturn` isCancelled
-      notes notebook `shouldReturn` ["cleaned up"]
+      notes entries `shouldReturn` ["cleaned up"]
 
-  inEach threaded "asks what it runs just once: a second cancellation does not interrupt the cleanup" $ \place -> do
-    notebook <- newLog
+  inEach threaded "makes only one stop request: a second cancellation does not interrupt the cleanup" $ \place -> do
+    entries <- newLog
     inside <- newGate
     cleaning <- newGate
     mayEnd <- newGate
@@ -84,8 +84,8 @@ cancelled = do
           (open inside >> hang) `onException` do
             open cleaning
             pass mayEnd -- which can be interrupted
-            note notebook "cleaned up"
-    launching (placed place act) $ \caller -> do
+            note entries "cleaned up"
+    withThread (placed place act) $ \caller -> do
       pass inside
       throwTo (asyncThreadId caller) theCancel
       pass cleaning
@@ -93,38 +93,38 @@ cancelled = do
       stillRunning caller
       open mayEnd
       awaitEnd caller `shouldReturn` isCancelled
-      notes notebook `shouldReturn` ["cleaned up"]
+      notes entries `shouldReturn` ["cleaned up"]
 
   inEach places "lets System.Timeout's timeout and async's cancel return" $ \place -> do
     System.timeout 1000 (placed place hang) `shouldReturn` Nothing
     inside <- newGate
-    launching (placed place (open inside >> hang)) $ \caller -> pass inside >> cancel caller
+    withThread (placed place (open inside >> hang)) $ \caller -> pass inside >> cancel caller
 
   inEach threaded "throws a fault of a cleanup together with the cancellation" $ \place -> do
     inside <- newGate
     cancelling (placed place ((open inside >> hang) `onException` throwIO (Fault "cleanup"))) (pass inside)
       `shouldReturn` CancelledWithFault (show theCancel) (show (Fault "cleanup"))
 
-  inEach threaded "does not go on behind a handler for the fault of a cleanup" $ \place -> do
-    notebook <- newLog
+  inEach threaded "does not continue after a handler for the fault of a cleanup" $ \place -> do
+    entries <- newLog
     inside <- newGate
     let act = placed place ((open inside >> hang) `onException` throwIO (Fault "cleanup"))
-        handled = void (try act :: IO (Either Fault ())) >> note notebook "went on"
+        handled = void (try act :: IO (Either Fault ())) >> note entries "went on"
     cancelling handled (pass inside)
       `shouldReturn` CancelledWithFault (show theCancel) (show (Fault "cleanup"))
-    notes notebook `shouldReturn` []
+    notes entries `shouldReturn` []
 
-  inEach threaded "takes neither a failure nor a result of what it stops for the end of the matter" $ \place -> do
-    notebook <- newLog
+  inEach threaded "ends as cancelled also when what it stops fails or gives a result" $ \place -> do
+    entries <- newLog
     forM_ [failed, pure ()] $ \end -> do
       inside <- newGate
       let act = (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> end
-      cancelling ((placed place act ? pure ()) >> note notebook "went on") (pass inside)
+      cancelling ((placed place act ? pure ()) >> note entries "went on") (pass inside)
         `shouldReturn` isCancelled
-    notes notebook `shouldReturn` []
+    notes entries `shouldReturn` []
 
-  inEach threaded "is not told of a deadlock while it waits for a cleanup that is" $ \place -> do
-    notebook <- newLog
+  inEach threaded "receives no deadlock exception while it waits for a cleanup that is deadlocked" $ \place -> do
+    entries <- newLog
     inside <- newGate
     cleaning <- newGate
     recovered <- newGate
@@ -132,30 +132,30 @@ cancelled = do
         act =
           (open inside >> hang) `onException` do
             open cleaning
-            deadlock `catch` \BlockedIndefinitelyOnMVar -> note notebook "recovered"
-    -- GHC finds a deadlock when it collects garbage, which this one does; it holds
-    -- no reference to any thread.
+            deadlock `catch` \BlockedIndefinitelyOnMVar -> note entries "recovered"
+    -- GHC detects a deadlock when it collects garbage, which this thread makes it do; the
+    -- thread holds no reference to any thread.
     _ <- forkIO $ pass cleaning >> untilOpen recovered (performMajorGC >> yield)
-    launching (leavingNothing (placed place act)) $ \caller -> do
+    withThread (leavingNothing (placed place act)) $ \caller -> do
       pass inside
       throwTo (asyncThreadId caller) theCancel
       -- This thread is deadlocked as well.
       end <- endingOf <$> awaitUninterruptibly (atomically (waitCatchSTM caller))
       open recovered
       end `shouldBe` isCancelled
-      notes notebook `shouldReturn` ["recovered"]
+      notes entries `shouldReturn` ["recovered"]
 
 branches :: Spec
 branches = do
   inEach threaded "runs unmasked, whatever the caller's masking state" $ \place ->
     forM_ [id, mask_, uninterruptibleMask_] $ \inState ->
-      snd <$> observing (\notebook -> inState (placed place (getMaskingState >>= note notebook)))
+      snd <$> observing (\entries -> inState (placed place (getMaskingState >>= note entries)))
         `shouldReturn` [Unmasked]
 
   inEach inCaller "(a behaviour in the caller's thread) keeps the caller's masking state" $ \place ->
     forM_ [(id, Unmasked), (mask_, MaskedInterruptible), (uninterruptibleMask_, MaskedUninterruptible)] $
       \(inState, state) ->
-        snd <$> observing (\notebook -> inState (placed place (getMaskingState >>= note notebook)))
+        snd <$> observing (\entries -> inState (placed place (getMaskingState >>= note entries)))
           `shouldReturn` [state]
 
   inEach threaded "can be stopped where the operator is called masked, uninterruptibly, or in a handler" $ \place ->
@@ -165,8 +165,8 @@ branches = do
         inState (placed place (open inside >> hang) ||| pass inside)
 
   inEach threaded "is labelled with its operator and its name, and is reported when it starts and ends" $ \place -> do
-    (_, events) <- observing $ \notebook ->
-      withSink (note notebook) (placed place (pure ()))
+    (_, events) <- observing $ \entries ->
+      withSink (note entries) (placed place (pure ()))
     let started = [label | Started label <- events]
         ended = [label | Ended label <- events]
     [label | label <- started, Just label == placeLabel place] `shouldSatisfy` ((== 1) . length)
@@ -178,19 +178,19 @@ branches = do
   inEach places "ends its operator with its failure" $ \place ->
     ending (placed place (throwIO theFailure)) `shouldReturn` FailedWith (show theFailure)
 
-  inEach threaded "that is killed by somebody else ends its operator with what killed it" $ \place ->
+  inEach threaded "that is killed, not by its operator, ends the operator with what killed it" $ \place ->
     ending (placed place (myThreadId >>= killThread)) `shouldReturn` CancelledBy (show ThreadKilled)
 
-  inEach threaded "faults past every handler when an operator stops it" $ \place -> do
-    notebook <- newLog
+  inEach threaded "throws a fault past every handler when an operator stops it" $ \place -> do
+    entries <- newLog
     inside <- newGate
     let act = placed place ((open inside >> hang) `onException` throwIO (Fault "cleanup"))
-        handled = void (try act :: IO (Either Fault ())) >> note notebook "went on"
+        handled = void (try act :: IO (Either Fault ())) >> note entries "went on"
     ending (handled ||| pass inside) `shouldReturn` FaultedWith (show (Fault "cleanup"))
-    notes notebook `shouldReturn` []
+    notes entries `shouldReturn` []
 
-  inEach threaded "does not mistake the request to stop that another branch was given for its own" $ \place -> do
-    stray <- requestToStop
+  inEach threaded "does not mistake the stop request of another branch for its own" $ \place -> do
+    stray <- usedStopRequest
     let isStray = CancelledBy (show stray)
     ending (placed place (throwIO stray)) `shouldReturn` isStray
     inside <- newGate
@@ -198,8 +198,8 @@ branches = do
     ending (placed place act ||| pass inside) `shouldReturn` isStray
 
 -- | The exception by which an operator stopped a branch that has ended since.
-requestToStop :: IO SomeException
-requestToStop = do
+usedStopRequest :: IO SomeException
+usedStopRequest = do
   caught <- newEmptyMVar
   inside <- newGate
   ((open inside >> hang) `catch` \(e :: SomeException) -> putMVar caught e >> throwIO e) ||| pass inside
@@ -207,17 +207,17 @@ requestToStop = do
 
 nested :: Spec
 nested = do
-  inEach places "are stopped at the level where somebody asks for it, and no other" $ \place -> do
+  inEach places "are stopped at the level where a stop is requested, and at no other" $ \place -> do
     let level :: (IO () -> IO () -> IO () -> IO ()) -> IO (Ending (Ending ()), [String])
         level which = do
           inside <- newGate
           inner <- newGate
           outer <- newGate
-          observing $ \notebook -> do
-            let act = (open inside >> hang) `onException` note notebook "cleaned up"
-                operator = placed place ((act ||| pass inner) >> note notebook "inner ended")
-                whole = ((operator >> note notebook "operator ended") ||| pass outer) >> note notebook "outer ended"
-            launching whole $ \caller -> do
+          observing $ \entries -> do
+            let act = (open inside >> hang) `onException` note entries "cleaned up"
+                operator = placed place ((act ||| pass inner) >> note entries "inner ended")
+                whole = ((operator >> note entries "operator ended") ||| pass outer) >> note entries "outer ended"
+            withThread whole $ \caller -> do
               pass inside
               which (open inner) (open outer) (throwTo (asyncThreadId caller) theCancel)
               awaitEnd caller
@@ -228,24 +228,24 @@ nested = do
 
   inEach places "are all stopped, in any order of nesting, when the outermost is cancelled" $ \place ->
     forM_ places $ \place' -> do
-      notebook <- newLog
+      entries <- newLog
       inside <- newGate
-      let act = (open inside >> hang) `onException` note notebook (show place')
+      let act = (open inside >> hang) `onException` note entries (show place')
       end <- cancelling (leavingNothing (placed place (placed place' act))) (pass inside)
-      done <- notes notebook
+      done <- notes entries
       (end, done) `shouldBe` (isCancelled, [show place'])
 
   inEach places "are all stopped through threads of async's, and handlers that rethrow" $ \place ->
     forM_ places $ \place' -> do
-      notebook <- newLog
+      entries <- newLog
       inside <- newGate
-      let act = (open inside >> hang) `onException` note notebook (show place')
+      let act = (open inside >> hang) `onException` note entries (show place')
           between inner = race_ (inner `catch` \(e :: SomeException) -> throwIO e) hang
       end <- cancelling (leavingNothing (placed place (between (placed place' act)))) (pass inside)
-      done <- notes notebook
+      done <- notes entries
       (end, done) `shouldBe` (isCancelled, [show place'])
 
-  inEach threaded "pass a fault out of any depth while they are stopped" $ \place ->
+  inEach threaded "rethrow a fault from any depth while they are stopped" $ \place ->
     forM_ threaded $ \place' -> do
       inside <- newGate
       let act = placed place (placed place' ((open inside >> hang) `onException` throwIO (Fault (show place'))))

@@ -1,6 +1,6 @@
 -- |
--- That the reactive operators run in constant memory, however often they switch, and
--- never have two branches running in a million switches.
+-- The reactive operators run in constant memory, however often they switch, and never
+-- run two branches at the same time in a million switches.
 module Behavior.ReactiveSpaceSpec (spec) where
 
 import Control.Concurrent (getNumCapabilities, setNumCapabilities)
@@ -15,12 +15,12 @@ import Memory
 import Support
 import Watched
 
--- | A million switches take seconds; so these have a watchdog of their own. And they
--- run on one capability, since on several GHC's transactions now and then wait for each
--- other by spinning, for as long as the operating system lets them: that may take
--- milliseconds each time, and tells nothing of memory.
+-- | A million switches take seconds; so these examples have a watchdog of their own. And
+-- they run on one capability: on several, GHC's transactions sometimes wait for each other
+-- by spinning, for as long as the operating system lets them. That may take milliseconds
+-- each time, and has nothing to do with memory.
 spec :: Spec
-spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In constant memory run" $ do
+spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In constant memory:" $ do
   it "a million reselections by rSelect, one branch at a time" $
     inConstantMemory 1000000 $ \step -> do
       occupancy <- newOccupancyCounter
@@ -33,14 +33,14 @@ spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In co
               modifyTVar' condition not
               (<= 0) <$> readTVar left
             unless over hang
-      Signal.rSelect (dialled condition) branch branch
+      Signal.rSelect (watchedVar condition) branch branch
       mostInside occupancy `shouldReturn` 1
 
   it "a million recoveries by monitor" $
     inConstantMemory 1000000 $ \step -> do
       low <- newTVarIO (1000000 :: Int)
       let recovery = step >> atomically (modifyTVar' low (subtract 1))
-      Signal.monitor ((> 0) <$> dialled low) recovery (pure ())
+      Signal.monitor ((> 0) <$> watchedVar low) recovery (pure ())
 
   it "a million interruptions by monitor, and as many recoveries, one behaviour at a time" $
     inConstantMemory 1000000 $ \step -> do
@@ -55,14 +55,14 @@ spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In co
               (<= 0) <$> readTVar left
             unless over hang
           recovery = inside occupancy (atomically (writeTVar condition False))
-      Signal.monitor (dialled condition) recovery task
+      Signal.monitor (watchedVar condition) recovery task
       mostInside occupancy `shouldReturn` 1
 
   it "a hundred thousand recoveries on a signal that needs a thread, each time a new one" $
     inConstantMemory 100000 $ \step -> do
       level <- newTVarIO (100000 :: Int)
       let recovery = step >> atomically (modifyTVar' level (subtract 1))
-      Signal.monitor (Signal.hysteresis False 0 1 (dialled level)) recovery (pure ())
+      Signal.monitor (Signal.hysteresis False 0 1 (watchedVar level)) recovery (pure ())
 
   it "a hundred thousand operators on one shared signal" $
     inConstantMemory 100000 $ \step ->

@@ -1,7 +1,7 @@
 -- |
--- The reactive operators, each by itself, on conditions that are watched. What is the
--- same for all is in "Behavior.OperatorsSpec" and "Behavior.OutcomeSpec";
--- 'Signal.monitor' has a spec of its own.
+-- The reactive operators, each by itself, on watched conditions. Their promises in common
+-- are in "Behavior.OperatorsSpec" and "Behavior.OutcomeSpec"; 'Signal.monitor' has a spec
+-- of its own.
 module Behavior.ReactiveSpec (spec) where
 
 import Control.Concurrent (yield)
@@ -61,15 +61,15 @@ laws = do
 
 selecting :: Spec
 selecting = do
-  -- Each branch turns the condition to the next value that the script has for it, until
-  -- one is another than its own: then it waits to be stopped.
-  prop "runs what the condition says, change after change" $ \first script ->
+  -- Each branch sets the condition to the next value of the script that is not its own,
+  -- and then waits to be stopped. Without such a value it ends.
+  prop "runs the branch that the condition selects, change after change" $ \first script ->
     ioProperty $ do
-      book <- newLog
+      entries <- newLog
       condition <- newTVarIO first
       rest <- newTVarIO script
       let branch own = do
-            note book own
+            note entries own
             over <- atomically $ do
               (same, others) <- span (== own) <$> readTVar rest
               writeTVar rest (drop 1 others)
@@ -77,10 +77,10 @@ selecting = do
                 [] -> True <$ pure same
                 next : _ -> False <$ writeTVar condition next
             unless over hang
-      Signal.rSelect (dialled condition) (branch True) (branch False)
-      ([key | key : _ <- group (first : script)] ===) <$> notes book
+      Signal.rSelect (watchedVar condition) (branch True) (branch False)
+      ([key | key : _ <- group (first : script)] ===) <$> notes entries
 
-  it "never runs both branches at once, however the condition flickers" $ do
+  it "never runs both branches at the same time, however the condition flickers" $ do
     occupancy <- newOccupancyCounter
     condition <- newTVarIO True
     runs <- newTVarIO Nothing
@@ -89,10 +89,10 @@ selecting = do
           inside occupancy $
             (atomically (writeTVar runs (Just own)) >> pass over)
               `onException` replicateM_ 3 yield
-    launching (Signal.rSelect (dialled condition) (branch True) (branch False)) $ \caller -> do
+    withThread (Signal.rSelect (watchedVar condition) (branch True) (branch False)) $ \caller -> do
       for_ [1 .. 500 :: Int] $ \n -> do
         atomically (modifyTVar' condition not)
-        -- Two times of three what the condition says may come to run.
+        -- Two times of three, wait until the selected branch runs.
         unless (n `mod` 3 == 0) . atomically $
           (==) <$> readTVar runs <*> (Just <$> readTVar condition) >>= check
       open over
@@ -103,73 +103,73 @@ selecting = do
     occupancy <- newOccupancyCounter
     condition <- newTVarIO True
     ran <- newTVarIO (0 :: Int)
-    -- Masked, it runs wholly or not at all: a run that counts has completed, and must be
-    -- the only one.
+    -- Masked, it runs completely or not at all: a run that is counted has completed, and
+    -- must be the only one.
     let branch = mask_ (inside occupancy (atomically (modifyTVar' ran (+ 1))))
         flicker = replicateM_ 20 (atomically (modifyTVar' condition not) >> yield)
-    replicateM_ 500 . launching flicker $ \flickering -> do
-      Signal.rSelect (dialled condition) branch branch
+    replicateM_ 500 . withThread flicker $ \flickering -> do
+      Signal.rSelect (watchedVar condition) branch branch
       awaitEnd flickering `shouldReturn` Gave ()
     readTVarIO ran `shouldReturn` 500
     mostInside occupancy `shouldReturn` 1
 
-  it "does what the condition says when the old branch has ended, not when it changed" $ do
-    book <- newLog
+  it "runs the branch that the condition selects when the old one has ended, not when it changed" $ do
+    entries <- newLog
     condition <- newTVarIO 'a'
     entered <- newGate
     cleaning <- newGate
     release <- newGate
     let branch 'a' = do
-          note book "a"
+          note entries "a"
           (open entered >> hang) `onException` do
             open cleaning
             pass release
-            note book "a is over"
-        branch key = note book [key]
-    launching (Signal.switch (dialled condition) branch) $ \caller -> do
+            note entries "a is over"
+        branch key = note entries [key]
+    withThread (Signal.switch (watchedVar condition) branch) $ \caller -> do
       pass entered
       atomically (writeTVar condition 'b')
       pass cleaning
       atomically (writeTVar condition 'c')
       open release
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["a", "a is over", "c"]
+    notes entries `shouldReturn` ["a", "a is over", "c"]
 
-  it "runs the same branch anew when the condition has changed back meanwhile" $ do
-    book <- newLog
+  it "restarts the same branch when the condition has changed back meanwhile" $ do
+    entries <- newLog
     condition <- newTVarIO True
     entered <- newGate
     let left =
-          notes book >>= \before ->
+          notes entries >>= \before ->
             if null before
               then do
-                note book "left"
-                -- The cleanup itself turns the condition back.
+                note entries "left"
+                -- The cleanup itself changes the condition back.
                 (open entered >> hang) `onException` atomically (writeTVar condition True)
-              else note book "left again"
-        right = note book "right"
-    launching (Signal.rSelect (dialled condition) left right) $ \caller -> do
+              else note entries "left again"
+        right = note entries "right"
+    withThread (Signal.rSelect (watchedVar condition) left right) $ \caller -> do
       pass entered
       atomically (writeTVar condition False)
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["left", "left again"]
+    notes entries `shouldReturn` ["left", "left again"]
 
-  for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
-    it ("starts nothing when the condition, read again, says " ++ show news) $ do
-      book <- newLog
+  for_ [SensorFailure, SensorFault, NoValue] $ \newState ->
+    it ("starts nothing when the condition's state, read again, is " ++ show newState) $ do
+      entries <- newLog
       condition <- newTestCondition True
       entered <- newGate
-      let left = note book "left" >> (open entered >> hang) `onException` set condition news
-          right = note book "right"
-      launching (Signal.rSelect (watched condition) left right) $ \caller -> do
+      let left = note entries "left" >> (open entered >> hang) `onException` set condition newState
+          right = note entries "right"
+      withThread (Signal.rSelect (watched condition) left right) $ \caller -> do
         pass entered
-        set condition (Says False)
-        awaitEnd caller `shouldReturn` expected news
-      notes book `shouldReturn` ["left"]
+        set condition (Value False)
+        awaitEnd caller `shouldReturn` expected newState
+      notes entries `shouldReturn` ["left"]
 
-  it "hears its own cancellation while a branch is slow to hear the stop, and stops its sensor then" $ do
-    -- The branch is asked at 1.2, and hears nothing until 5. The caller is cancelled at 3:
-    -- it no longer waits to be heard, and so has to ask again.
+  it "receives its cancellation while a branch is uninterruptible, and then stops its sensor" $ do
+    -- The stop of the branch is requested at 1.2, and the branch is uninterruptible until 5.
+    -- The caller is cancelled at 3: that interrupts its stop request, which it has to repeat.
     readings' <- newIORef []
     let test = now >>= \t -> (t < 1) <$ modifyIORef readings' (t :)
         slow = uninterruptibleMask_ (sleep 5) >> sleep 100
@@ -177,94 +177,94 @@ selecting = do
     finished run `shouldBe` 5
     readIORef readings' >>= (`shouldSatisfy` (<= 3)) . maximum
  where
-  expected news = case news of
-    SaysFailure -> FailedWith "FailedBecause \"the sensor\""
-    SaysFault -> FaultedWith (show (Fault "the sensor"))
+  expected newState = case newState of
+    SensorFailure -> FailedWith "FailedBecause \"the sensor\""
+    SensorFault -> FaultedWith (show (Fault "the sensor"))
     _ -> FailedWith "FailedBecause \"the signal has no value any more\""
 
--- | Something of which it is known only whether it is the same.
+-- | A type with nothing but equality.
 data Mode = Search | Fetch | Rest
   deriving (Eq)
 
 switching :: Spec
 switching =
-  it "has a branch for each value of any type that can be compared" $ do
-    book <- newLog
+  it "has a branch for each value of any type with equality" $ do
+    entries <- newLog
     mode <- newTVarIO Search
     let become next = atomically (writeTVar mode next)
-        behave Search = note book "search" >> become Fetch >> hang
-        behave Fetch = note book "fetch" >> become Rest >> hang
-        behave Rest = note book "rest"
-    Signal.switch (dialled mode) behave
-    notes book `shouldReturn` ["search", "fetch", "rest"]
+        behave Search = note entries "search" >> become Fetch >> hang
+        behave Fetch = note entries "fetch" >> become Rest >> hang
+        behave Rest = note entries "rest"
+    Signal.switch (watchedVar mode) behave
+    notes entries `shouldReturn` ["search", "fetch", "rest"]
 
 rules :: Spec
 rules = do
-  it "gives way to an earlier rule, and not to a later one" $ do
-    book <- newLog
+  it "interrupts a rule for an earlier one, and not for a later one" $ do
+    entries <- newLog
     [first, second, third] <- traverse newTVarIO [False, True, False]
     let turn variable = atomically . writeTVar variable
-        one = note book "first"
+        one = note entries "first"
         two = do
-          note book "second"
+          note entries "second"
           turn third True
-          -- If it gave way to the third, it would be stopped before it could say so.
-          mask_ (note book "second goes on")
+          -- If it were interrupted for the third, it would be stopped before this entry.
+          mask_ (note entries "second goes on")
           turn first True
           hang
-        three = note book "third"
-    Signal.teleoReactive (zip (map dialled [first, second, third]) [one, two, three])
-    notes book `shouldReturn` ["second", "second goes on", "first"]
+        three = note entries "third"
+    Signal.teleoReactive (zip (map watchedVar [first, second, third]) [one, two, three])
+    notes entries `shouldReturn` ["second", "second goes on", "first"]
 
-  it "goes on to the next rule that holds when its own no longer does" $ do
-    book <- newLog
+  it "starts the next rule that holds when the running one no longer does" $ do
+    entries <- newLog
     first <- newTVarIO True
-    let one = note book "first" >> atomically (writeTVar first False) >> hang
+    let one = note entries "first" >> atomically (writeTVar first False) >> hang
     Signal.teleoReactive
-      [(dialled first, one), (pure False, note book "second"), (pure True, note book "third")]
-    notes book `shouldReturn` ["first", "third"]
+      [(watchedVar first, one), (pure False, note entries "second"), (pure True, note entries "third")]
+    notes entries `shouldReturn` ["first", "third"]
 
   it "waits while no rule holds, at first and later" $ do
-    book <- newLog
+    entries <- newLog
     hungry <- newTVarIO False
     tired <- newTVarIO False
     entered <- newGate
     let turn variable = atomically . writeTVar variable
-        eat = note book "eat" >> open entered >> hang
-        sleeps = note book "sleep"
-    launching (Signal.teleoReactive [(dialled tired, sleeps), (dialled hungry, eat)]) $ \caller -> do
+        eat = note entries "eat" >> open entered >> hang
+        sleeps = note entries "sleep"
+    withThread (Signal.teleoReactive [(watchedVar tired, sleeps), (watchedVar hungry, eat)]) $ \caller -> do
       stillRunning caller
       turn hungry True
       pass entered
       turn hungry False
       stillRunning caller
-      note book "now"
+      note entries "now"
       turn tired True
       awaitEnd caller `shouldReturn` Gave ()
-    notes book `shouldReturn` ["eat", "now", "sleep"]
+    notes entries `shouldReturn` ["eat", "now", "sleep"]
 
-  it "fails when a condition does, also while no rule holds" $ do
+  it "fails when a condition fails, also while no rule holds" $ do
     condition <- newTestCondition False
-    launching (Signal.teleoReactive [(watched condition, pure ()), (pure False, pure ())]) $ \caller -> do
+    withThread (Signal.teleoReactive [(watched condition, pure ()), (pure False, pure ())]) $ \caller -> do
       stillRunning caller
-      set condition SaysFailure
+      set condition SensorFailure
       awaitEnd caller `shouldReturn` FailedWith "FailedBecause \"the sensor\""
 
 waiting :: Spec
 waiting = do
   it "returns when the condition holds, and not before" $ do
     condition <- newTestCondition False
-    launching (Signal.waitUntil (watched condition)) $ \caller -> do
+    withThread (Signal.waitUntil (watched condition)) $ \caller -> do
       stillRunning caller
-      set condition (Says True)
+      set condition (Value True)
       awaitEnd caller `shouldReturn` Gave ()
 
-  for_ [SaysFailure, SaysFault, SaysNothing] $ \news ->
-    it ("takes for an end, and not for false, that the condition says " ++ show news) $ do
+  for_ [SensorFailure, SensorFault, NoValue] $ \newState ->
+    it ("ends, instead of waiting on, when the condition's state is " ++ show newState) $ do
       condition <- newTestCondition False
-      launching (Signal.waitUntil (watched condition)) $ \caller -> do
+      withThread (Signal.waitUntil (watched condition)) $ \caller -> do
         stillRunning caller
-        set condition news
+        set condition newState
         awaitEnd caller >>= (`shouldSatisfy` (/= Gave ()))
 
   it "can be cancelled" $ do
@@ -275,9 +275,9 @@ waiting = do
 holding :: Spec
 holding =
   it "fails, once its branch has ended, when the condition stops holding" $ do
-    book <- newLog
+    entries <- newLog
     condition <- newTestCondition True
-    let grip = note book "grip" >> (set condition (Says False) >> hang) `onException` note book "let go"
-    end <- ending (Signal.whileHolding (watched condition) grip `onException` note book "failed")
+    let grip = note entries "grip" >> (set condition (Value False) >> hang) `onException` note entries "let go"
+    end <- ending (Signal.whileHolding (watched condition) grip `onException` note entries "failed")
     end `shouldBe` (FailedWith "FailedBecause \"the condition does not hold\"" :: Ending ())
-    notes book `shouldReturn` ["grip", "let go", "failed"]
+    notes entries `shouldReturn` ["grip", "let go", "failed"]

@@ -2,8 +2,8 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- 'runBehavior', with signals that this very process raises. (Where a process is to
--- end it is a child.)
+-- 'runBehavior', with signals that this process raises itself. (A process that has to end
+-- is a child.)
 module Behavior.RunBehaviorSpec (spec) where
 
 import Control.Concurrent
@@ -33,47 +33,47 @@ spec = guarded . describe "runBehavior" $ do
     (runBehavior (throwIO (Fault "bug")) :: IO ()) `shouldThrow` (== Fault "bug")
 
   it "runs it in an unbound thread, labelled, and unmasked" $ do
-    (end, events) <- observing $ \notebook -> withSink (note notebook) $
+    (end, events) <- observing $ \entries -> withSink (note entries) $
       bound (mask_ (runBehavior ((,) <$> isCurrentThreadBound <*> getMaskingState)))
     end `shouldBe` Gave (False, Unmasked)
     events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
 
   for_ [(sigINT, sigTERM, "SIGINT", 130), (sigTERM, sigINT, "SIGTERM", 143)] $ \(signal, otherSignal, name, code) -> do
     it ("ends with " ++ show code ++ " after a " ++ name ++ ", when the cleanups have ended") $ do
-      notebook <- newLog
+      entries <- newLog
       cleaning <- newGate
       mayEnd <- newGate
       let act = uninterruptibly (raiseSignal signal >> hang) $ do
             open cleaning
             pass mayEnd
-            note notebook "cleaned up"
-      launching (leavingNothing (runBehavior act)) $ \caller -> do
+            note entries "cleaned up"
+      withThread (leavingNothing (runBehavior act)) $ \caller -> do
         pass cleaning
         stillRunning caller
         open mayEnd
         wait caller `shouldThrow` (== ExitFailure code)
-        notes notebook `shouldReturn` ["cleaned up"]
+        notes entries `shouldReturn` ["cleaned up"]
 
-    it ("ends with " ++ show code ++ " after a " ++ name ++ " also if the behaviour completes or fails all the same") $
+    it ("ends with " ++ show code ++ " after a " ++ name ++ ", also if the behaviour nevertheless completes or fails") $
       for_ [pure (), failed] $ \end ->
         runBehavior ((raiseSignal signal >> hang) `catch` \(_ :: SomeAsyncException) -> end)
           `shouldThrow` (== ExitFailure code)
 
-    it ("does not let ? take a " ++ name ++ " for a failure") $ do
-      (_, done) <- observing $ \notebook ->
-        runBehavior ((raiseSignal signal >> hang) ? note notebook "went on")
+    it ("does not let ? treat a " ++ name ++ " as a failure") $ do
+      (_, done) <- observing $ \entries ->
+        runBehavior ((raiseSignal signal >> hang) ? note entries "went on")
       done `shouldBe` []
 
     it ("throws a fault of a cleanup after a " ++ name) $
       runBehavior ((raiseSignal signal >> hang) `onException` throwIO (Fault "cleanup") :: IO ())
         `shouldThrow` (== Fault "cleanup")
 
-    it ("leaves it to others what a " ++ name ++ " does, before and after") $
+    it ("restores at its end the handler of " ++ name ++ " that was installed before") $
       for_ [pure (), failed, throwIO (Fault "bug"), raiseSignal signal >> hang] $ \act -> do
-        withHandler signal $ \heard -> do
+        withHandler signal $ \received -> do
           _ <- try (runBehavior act) :: IO (Either SomeException ())
           raiseSignal signal
-          takeMVar heard
+          takeMVar received
 
     it ("ends the process at once at a second " ++ name ++ ", even during a cleanup") $
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal signal >> hang)))
@@ -83,16 +83,16 @@ spec = guarded . describe "runBehavior" $ do
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal otherSignal >> hang)))
         >>= (`shouldBe` Terminated otherSignal False)
 
-    it ("takes a second " ++ name ++ " that came with the first one for the same") $ do
+    it ("treats a second " ++ name ++ " that arrives with the first one as the same signal") $ do
       let twice = installed signal >>= \handler -> (handler >> hang) `onException` handler
       inChild (byDefault signal >> runBehavior twice) >>= (`shouldBe` Exited (ExitFailure code))
 
-    it ("gives a result that is there, though a " ++ name ++ " came before it") $
-      withHandler signal $ \heard -> do
-        -- (Not always: with two capabilities the signal may be seen before there is a result.)
+    it ("gives a result that is available, though a " ++ name ++ " came before it") $
+      withHandler signal $ \received -> do
+        -- (Not always: with two capabilities the signal may be received before there is a result.)
         ends <- replicateM 100 $ do
           end <- try (runBehavior ('a' <$ join (installed signal)))
-          either (const (pure ())) (const (takeMVar heard)) end
+          either (const (pure ())) (const (takeMVar received)) end
           pure end
         ends `shouldContain` [Right 'a' :: Either ExitCode Char]
 
@@ -102,16 +102,16 @@ spec = guarded . describe "runBehavior" $ do
         there <- installHandler signal Ignore Nothing
         case there of
           Ignore -> pure ()
-          _ -> expectationFailure "another handler is there"
+          _ -> expectationFailure "another handler is installed"
 
-    it ("cancels by a " ++ name ++ " what still runs when some have ended that began before and after it") $
+    it ("cancels by a " ++ name ++ " a behaviour that still runs when others, begun before and after it, have ended") $
       withHandler signal $ \_ -> do
         began <- newGate
         mayEnd <- newGate
         inside <- newGate
-        launching (runBehavior (open began >> pass mayEnd)) $ \before' -> do
+        withThread (runBehavior (open began >> pass mayEnd)) $ \before' -> do
           pass began
-          launching (runBehavior (open inside >> hang)) $ \caller -> do
+          withThread (runBehavior (open inside >> hang)) $ \caller -> do
             pass inside
             open mayEnd
             wait before'
@@ -119,26 +119,26 @@ spec = guarded . describe "runBehavior" $ do
             raiseSignal signal
             (wait caller :: IO ()) `shouldThrow` (== ExitFailure code)
 
-    it ("gives a " ++ name ++ " whose handler starts after the end to the handler that was there before") $
-      withHandler signal $ \heard -> do
+    it ("passes a " ++ name ++ " whose handler starts after the end to the handler that was installed before") $
+      withHandler signal $ \received -> do
         join (runBehavior (installed signal))
-        takeMVar heard
+        takeMVar received
 
-    it ("gives a " ++ name ++ " whose handler starts after the end to a handler that was installed meanwhile") $ do
+    it ("passes a " ++ name ++ " whose handler starts after the end to a handler that was installed meanwhile") $ do
       late <- runBehavior (installed signal)
-      withHandler signal $ \heard -> late >> takeMVar heard
+      withHandler signal $ \received -> late >> takeMVar received
 
     it ("cancels the next behaviour by a " ++ name ++ " whose handler starts after the end of the one before") $ do
       late <- runBehavior (installed signal)
       runBehavior (late >> hang) `shouldThrow` (== ExitFailure code)
 
-    it ("gives a " ++ name ++ " to the handler that was there before when the caller was cancelled first") $
-      withHandler signal $ \heard -> do
+    it ("passes a " ++ name ++ " to the handler that was installed before when the caller was cancelled first") $
+      withHandler signal $ \received -> do
         inside <- newGate
         let act = (open inside >> hang) `onException` join (installed signal)
         cancelling (runBehavior act) (pass inside)
           `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
-        takeMVar heard
+        takeMVar received
 
     it ("ends the process by a " ++ name ++ " after the end, where that is the default") $ do
       inChild (byDefault signal >> runBehavior (pure ()) >> raiseSignal signal >> hang)
@@ -148,14 +148,14 @@ spec = guarded . describe "runBehavior" $ do
       inChild (byDefault signal >> join (runBehavior (installed signal)) >> hang)
         >>= (`shouldBe` Terminated signal False)
 
-    it ("cancels all that run by a " ++ name ++ ", side by side or one inside the other") $ do
+    it ("cancels by a " ++ name ++ " all that run, side by side or one inside the other") $ do
       inside <- newGate
-      launching (runBehavior (runBehavior (open inside >> hang))) $ \other -> do
+      withThread (runBehavior (runBehavior (open inside >> hang))) $ \other -> do
         pass inside
         (runBehavior (raiseSignal signal >> hang) :: IO ()) `shouldThrow` (== ExitFailure code)
         (wait other :: IO ()) `shouldThrow` (== ExitFailure code)
 
-    it ("throws the exit in the thread that called it after a " ++ name ++ "; the process goes on") $
+    it ("throws the exit code in the thread that called it after a " ++ name ++ "; the process continues") $
       inChild
         ( do
             end <- newEmptyMVar
@@ -165,21 +165,21 @@ spec = guarded . describe "runBehavior" $ do
         )
         >>= (`shouldBe` Exited (ExitFailure 7))
 
-    it ("leaves a " ++ name ++ " alone in a process that the behaviour has forked, where nothing of it runs") $ do
+    it ("does not handle a " ++ name ++ " in a process that the behaviour has forked and where it does not run") $ do
       runBehavior (inChild (raiseSignal signal >> hang)) >>= (`shouldBe` Terminated signal False)
       runBehavior (inChild (runBehavior (raiseSignal signal >> hang))) >>= (`shouldBe` Exited (ExitFailure code))
 
-    it ("makes it the exit code of the process after a " ++ name) $
+    it ("ends the process with the exit code " ++ show code ++ " after a " ++ name) $
       inChild (runBehavior (raiseSignal signal >> hang))
         >>= (`shouldBe` Exited (ExitFailure code))
 
   it "waits for an action in runInBoundThread, which nothing interrupts" $
     when rtsSupportsBoundThreads $ do
-      notebook <- newLog
+      entries <- newLog
       inside <- newGate
       mayEnd <- newGate
-      let act = runInBoundThread (open inside >> pass mayEnd >> note notebook "to its end")
-      launching (runBehavior act) $ \caller -> do
+      let act = runInBoundThread (open inside >> pass mayEnd >> note entries "to its end")
+      withThread (runBehavior act) $ \caller -> do
         pass inside
         throwing (asyncThreadId caller) (Cancel "the caller")
         -- It waits: in the stop request, or for the end.
@@ -187,31 +187,31 @@ spec = guarded . describe "runBehavior" $ do
         poll caller >>= (`shouldBe` True) . isNothing
         open mayEnd
         awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "the caller"))
-      notes notebook `shouldReturn` ["to its end"]
+      notes entries `shouldReturn` ["to its end"]
 
   it "interrupts an action in a bound thread that withAsyncBound has started" $
     when rtsSupportsBoundThreads $ do
-      notebook <- newLog
+      entries <- newLog
       inside <- newGate
-      let act = (open inside >> hang) `onException` note notebook "cleaned up"
+      let act = (open inside >> hang) `onException` note entries "cleaned up"
       cancelling (runBehavior (withAsyncBound act wait)) (pass inside)
         `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
-      notes notebook `shouldReturn` ["cleaned up"]
+      notes entries `shouldReturn` ["cleaned up"]
 
   it "does not return before the behaviour has ended when its caller is cancelled" $ do
-    notebook <- newLog
+    entries <- newLog
     inside <- newGate
-    let act = (open inside >> hang) `onException` note notebook "cleaned up"
+    let act = (open inside >> hang) `onException` note entries "cleaned up"
     cancelling (leavingNothing (runBehavior act)) (pass inside)
       `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
-    notes notebook `shouldReturn` ["cleaned up"]
+    notes entries `shouldReturn` ["cleaned up"]
 
-  it "lets GHC find out that everything is deadlocked" $ do
+  it "lets GHC detect that all threads are deadlocked" $ do
     found <- newGate
     inside <- newGate
     let deadlock = open inside >> newEmptyMVar >>= takeMVar :: IO ()
     _ <- forkIO $ pass inside >> untilOpen found (performMajorGC >> yield)
-    launching (runBehavior deadlock) $ \caller -> do
+    withThread (runBehavior deadlock) $ \caller -> do
       end <- endingOf <$> awaitUninterruptibly (atomically (waitCatchSTM caller))
       open found
       end `shouldBe` FaultedWith (show BlockedIndefinitelyOnMVar)
@@ -221,7 +221,7 @@ spec = guarded . describe "runBehavior" $ do
     _ -> False
   bound act = if rtsSupportsBoundThreads then runInBoundThread act else act
 
--- | The action of the handler that is there.
+-- | The action of the installed handler.
 installed :: Signal -> IO (IO ())
 installed signal = do
   there <- installHandler signal Ignore Nothing
@@ -233,23 +233,23 @@ installed signal = do
 byDefault :: Signal -> IO ()
 byDefault signal = void (installHandler signal Default Nothing)
 
--- | Runs it where a signal fills a box.
+-- | Runs it with a handler that fills the given 'MVar' when the signal arrives.
 withHandler :: Signal -> (MVar () -> IO a) -> IO a
 withHandler signal act = do
-  heard <- newEmptyMVar
+  received <- newEmptyMVar
   bracket
-    (installHandler signal (Catch (putMVar heard ())) Nothing)
+    (installHandler signal (Catch (putMVar received ())) Nothing)
     (\old -> installHandler signal old Nothing)
-    (const (act heard))
+    (const (act received))
 
--- | Runs it as the program of a child, and says how that one ended. It is killed by
--- an alarm when it takes more than five seconds.
+-- | Runs it as the program of a child process, and returns how that ended. An alarm kills
+-- the child when it takes more than five seconds.
 inChild :: IO () -> IO ProcessStatus
 inChild program = do
-  hFlush stdout -- or the child would write it, too
+  hFlush stdout -- otherwise the child would write it, too
   child <- forkProcess $ do
     _ <- scheduleAlarm 5
     end <- try program
-    -- At once, for the child has nothing to clean up that is not its parent's.
+    -- Immediately: what there is to clean up belongs to the parent.
     exitImmediately (fromLeft ExitSuccess end)
   getProcessStatus True False child >>= maybe (inChild program) pure

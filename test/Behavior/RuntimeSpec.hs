@@ -2,7 +2,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- The seam, and the scope that all operators stand on.
+-- The seam, and the scope that all operators are built on.
 module Behavior.RuntimeSpec (spec) where
 
 import Control.Concurrent
@@ -41,7 +41,7 @@ stateOf = [id, mask_, uninterruptibleMask_]
 
 starting :: Spec
 starting = do
-  it "tells how the thread ended" $ do
+  it "publishes how the thread ended" $ do
     thread <- mask_ (start label (pure 'a'))
     atomically (threadEnd thread) >>= (`shouldBe` Gave 'a') . endingOf
     faulty <- mask_ (start label (throwIO (Fault "bug") :: IO ()))
@@ -56,7 +56,7 @@ starting = do
       self `shouldBe` threadId thread
       self `shouldNotBe` caller
 
-  it "counts the thread among the living until it has ended, and no longer" $ do
+  it "counts the thread as live until it has ended, and no longer" $ do
     before' <- liveThreadCount
     gate <- newGate
     thread <- mask_ (start label (pass gate))
@@ -73,7 +73,7 @@ starting = do
     found `shouldBe` Just (show label)
 #endif
 
-  it "always tells how it ended, even if it was killed as soon as it was started" $
+  it "always publishes how it ended, even if it was killed as soon as it was started" $
     for_ [1 .. 2000 :: Int] $ \_ -> do
       thread <- mask_ (start label hang) :: IO (Thread (Either SomeException ()))
       killThread (threadId thread)
@@ -82,19 +82,19 @@ starting = do
 
 interrupting :: Spec
 interrupting = do
-  it "returns when the thread has heard it" $ do
+  it "returns when the thread has received the exception" $ do
     inside <- newGate
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
     pass inside
-    launching (interrupt (threadId thread) (Cancel "thread")) $ \caller -> do
+    withThread (interrupt (threadId thread) (Cancel "thread")) $ \caller -> do
       poll caller >>= (`shouldBe` True) . isNothing
       open mayEnd
       awaitEnd caller `shouldReturn` Gave ()
       end <- atomically (threadEnd thread)
       endingOf end `shouldBe` CancelledBy (show (Cancel "thread"))
 
-  it "has thrown nothing if it is interrupted before the thread has heard it" $ do
+  it "has thrown nothing if it is interrupted before the thread has received the exception" $ do
     inside <- newGate
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> pure 'a'))
@@ -105,7 +105,7 @@ interrupting = do
     end <- atomically (threadEnd thread)
     endingOf end `shouldBe` Gave 'a'
 
-  it "by a helper thread does not wait" $ do
+  it "has a variant, throwToAll, that does not wait" $ do
     inside <- newGate
     mayEnd <- newGate
     thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
@@ -126,26 +126,26 @@ interrupting = do
 reporting :: Spec
 reporting = do
   it "reports the start and the end of each thread, in the thread itself, masked" $ do
-    notebook <- newLog
-    let sink event = (,,) event <$> myThreadId <*> getMaskingState >>= note notebook
+    entries <- newLog
+    let sink event = (,,) event <$> myThreadId <*> getMaskingState >>= note entries
     thread <- withSink sink $ do
       thread <- mask_ (start label (pure ()))
       thread <$ atomically (threadEnd thread)
-    events <- notes notebook
-    [(event, who) | (event, who, _) <- events]
+    events <- notes entries
+    [(event, reporter) | (event, reporter, _) <- events]
       `shouldBe` [(Started label, threadId thread), (Ended label, threadId thread)]
     [state | (_, _, state) <- events] `shouldSatisfy` notElem Unmasked
 
   it "reports the end of a thread that throws" $ do
-    (_, events) <- observing $ \notebook -> withSink (note notebook) $ do
+    (_, events) <- observing $ \entries -> withSink (note entries) $ do
       thread <- mask_ (start label (failed :: IO ()))
       atomically (threadEnd thread)
     events `shouldBe` [Started label, Ended label]
 
   it "reports nothing after the action has ended, in whatever way" $ do
-    (end, events) <- observing $ \notebook -> do
-      withSink (note notebook) (pure ())
-      _ <- ending (withSink (note notebook) failed)
+    (end, events) <- observing $ \entries -> do
+      withSink (note entries) (pure ())
+      _ <- ending (withSink (note entries) failed)
       thread <- mask_ (start label (pure ()))
       void (atomically (threadEnd thread))
     end `shouldBe` Gave ()
@@ -155,14 +155,14 @@ waiting :: Spec
 waiting = do
   it "can be interrupted, also where exceptions are masked" $
     for_ [id, mask_] $ \inState -> do
-      launching (inState (atomically retry)) $ \caller -> do
+      withThread (inState (atomically retry)) $ \caller -> do
         awaitIdle (asyncThreadId caller)
         throwTo (asyncThreadId caller) (Cancel "caller")
         awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "caller")) :: Ending ())
 
-  it "awaitUninterruptibly cannot" $ do
+  it "cannot be interrupted inside awaitUninterruptibly" $ do
     var <- newTVarIO False
-    launching (awaitUninterruptibly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $ \caller -> do
+    withThread (awaitUninterruptibly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $ \caller -> do
       awaitIdle (asyncThreadId caller)
       throwing (asyncThreadId caller) (Cancel "caller")
       stillRunning caller
@@ -172,13 +172,13 @@ waiting = do
   it "has a checkpoint where a cancellation arrives that was masked until then" $ do
     ready <- newGate
     mayGo <- newGate
-    (end, done) <- observing $ \notebook -> do
+    (end, done) <- observing $ \entries -> do
       let act = mask $ \restore -> do
             uninterruptibleMask_ (open ready >> pass mayGo)
-            note notebook "masked"
+            note entries "masked"
             restore checkpoint
-            note notebook "went on"
-      launching act $ \caller -> do
+            note entries "went on"
+      withThread act $ \caller -> do
         pass ready
         throwing (asyncThreadId caller) (Cancel "caller")
         open mayGo
@@ -187,49 +187,49 @@ waiting = do
 
 scopes :: Spec
 scopes = do
-  it "gives the verdict when nothing was started" $ do
+  it "runs the verdict when nothing was started" $ do
     structured (\_ -> pure (pure 'a')) `shouldReturn` 'a'
     structured (\_ -> pure (failed :: IO ())) `shouldThrow` (== Failed)
     structured (\_ -> failed :: IO (IO ())) `shouldThrow` (== Failed)
 
-  it "comes to the verdict when all has ended" $
+  it "runs the verdict when all branches have ended" $
     for_ [pure (), failed] $ \bodysEnd -> do
-      (_, done) <- observing $ \notebook -> structured $ \scope -> do
+      (_, done) <- observing $ \entries -> structured $ \scope -> do
         inside <- newGate
-        _ <- branch scope label ((open inside >> hang) `onException` note notebook "cleaned up") :: IO (Branch ())
+        _ <- branch scope label ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
         pass inside
-        pure (note notebook "verdict" >> bodysEnd)
+        pure (note entries "verdict" >> bodysEnd)
       done `shouldBe` ["cleaned up", "verdict"]
 
   it "stops what was started when the body throws" $ do
-    (end, done) <- observing $ \notebook -> structured $ \scope -> do
+    (end, done) <- observing $ \entries -> structured $ \scope -> do
       inside <- newGate
-      _ <- branch scope label ((open inside >> hang) `onException` note notebook "cleaned up") :: IO (Branch ())
+      _ <- branch scope label ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
       pass inside
       throwIO (Fault "body") :: IO (IO ())
     (end, done) `shouldBe` (FaultedWith (show (Fault "body")), ["cleaned up"])
 
-  it "tells a worker whether it was asked to stop" $ do
-    (_, told) <- observing $ \notebook -> structured $ \scope -> do
+  it "lets a worker read whether its stop was requested" $ do
+    (_, values) <- observing $ \entries -> structured $ \scope -> do
       inside <- newGate
       mayEnd <- newGate
-      started <- worker scope label $ \asked -> do
-        asked >>= note notebook
-        (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> asked >>= note notebook
+      started <- worker scope label $ \stopRequested -> do
+        stopRequested >>= note entries
+        (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> stopRequested >>= note entries
         pass mayEnd
       pass inside
       requestStopAsync [SomeBranch started]
       open mayEnd
       pure <$> atomically (outcome started)
-    told `shouldBe` [False, True]
+    values `shouldBe` [False, True]
 
-  it "asks nobody twice, however it is asked" $ do
-    (_, done) <- observing $ \notebook -> structured $ \scope -> do
+  it "throws the stop request to a branch only once, however often it is made" $ do
+    (_, done) <- observing $ \entries -> structured $ \scope -> do
       inside <- newGate
       cleaning <- newGate
       mayEnd <- newGate
       started <- branch scope label $
-        (open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note notebook "cleaned up") :: IO (Branch ())
+        (open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note entries "cleaned up") :: IO (Branch ())
       pass inside
       requestStopAsync [SomeBranch started]
       requestStopAsync [SomeBranch started]
@@ -238,19 +238,19 @@ scopes = do
       pure (pure ())
     done `shouldBe` ["cleaned up"]
 
-  it "asks without waiting those who cannot be interrupted just now" $ do
-    (end, done) <- observing $ \notebook -> structured $ \scope -> do
+  it "requests the stops of uninterruptible branches without waiting" $ do
+    (end, done) <- observing $ \entries -> structured $ \scope -> do
       insides <- replicateM 3 newGate
       mayEnd <- newGate
       started <- traverse (\inside -> branch scope label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) insides
       traverse_ pass insides
       requestStopAsync (map SomeBranch (started :: [Branch ()]))
-      note notebook "asked"
+      note entries "requested"
       open mayEnd
       pure (pure ())
-    (end, done) `shouldBe` (Gave (), ["asked"])
+    (end, done) `shouldBe` (Gave (), ["requested"])
 
-  it "says how each branch ended, and tells a result from anything else" $
+  it "gives the outcome of each branch, and turns it back into a result or an exception" $
     structured $ \scope -> do
       well <- branch scope label (pure 'a')
       badly <- branch scope label (failed :: IO Char)
@@ -259,42 +259,42 @@ scopes = do
       (outcomeToIO =<< atomically (outcome badly)) `shouldThrow` (== Failed)
       pure (pure ())
 
-  it "does not let a cancellation that comes while branches stop strike the caller's handlers" $ do
+  it "does not let a cancellation that arrives while branches stop interrupt the caller's handlers" $ do
     inside <- newGate
     cleaning <- newGate
     mayEnd <- newGate
-    (end, done) <- observing $ \notebook -> do
+    (end, done) <- observing $ \entries -> do
       let operator = structured $ \scope -> do
             _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
             pass inside
             pure (failed :: IO ())
-          -- The handler of a failure would be run, and interrupted.
-          handled = operator `catch` \(_ :: Failed) -> note notebook "handler"
-      launching handled $ \caller -> do
+          -- Otherwise the handler of the failure would be run, and interrupted.
+          handled = operator `catch` \(_ :: Failed) -> note entries "handler"
+      withThread handled $ \caller -> do
         pass cleaning
         throwing (asyncThreadId caller) (Cancel "caller")
         open mayEnd
         awaitEnd caller
     (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), [])
 
-  it "lets nothing that arrives while branches stop wait until a handler of the caller's runs" $
+  it "throws an exception that arrives while branches stop before a handler of the caller runs" $
     void . explore (randomly 1000) $ \simulated -> do
-      notebook <- newLog
+      entries <- newLog
       let operator = both (sleep 1 >> failed) (sleep 2)
-          handled = operator `catch` \(_ :: Failed) -> allowInterrupt `onException` note notebook "in the handler"
+          handled = operator `catch` \(_ :: Failed) -> allowInterrupt `onException` note entries "in the handler"
       _ <- simulated (parallel handled (sleep 1))
-      notes notebook `shouldReturn` []
+      notes entries `shouldReturn` []
 
-  it "gives a masked caller its verdict, though that is cancelled while branches stop" $ do
+  it "gives a masked caller the verdict's result, though the caller is cancelled while branches stop" $ do
     cleaning <- newGate
     mayEnd <- newGate
-    (end, done) <- observing $ \notebook -> do
+    (end, done) <- observing $ \entries -> do
       let operator = structured $ \scope -> do
             inside <- newGate
             _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
             pass inside
             pure (pure "verdict")
-      launching (mask_ (operator >>= note notebook) >> hang :: IO ()) $ \caller -> do
+      withThread (mask_ (operator >>= note entries) >> hang :: IO ()) $ \caller -> do
         pass cleaning
         throwing (asyncThreadId caller) (Cancel "caller")
         open mayEnd
@@ -307,7 +307,7 @@ scopes = do
       let operator = structured $ \scope -> do
             _ <- branch scope label ((open inside >> hang) `onException` throwIO (Fault "branch")) :: IO (Branch ())
             hang :: IO (IO ())
-      launching operator $ \caller -> do
+      withThread operator $ \caller -> do
         pass inside
         throwing (asyncThreadId caller) deadlock
         awaitEnd caller `shouldReturn` FaultedWith (show (Fault "branch"))
@@ -327,7 +327,7 @@ pairs = do
     ending (throwIO pair `catch` \(_ :: Fault) -> pure ())
       `shouldReturn` CancelledWithFault (show (Cancel "user")) (show (Fault "bug"))
 
-  it "says what it holds" $ do
+  it "shows both exceptions that it holds" $ do
     let pair = StoppedWithFault (toException (Cancel "user")) (toException (Fault "bug"))
     show (Just pair) `shouldBe` "Just (StoppedWithFault (Cancel \"user\") (Fault \"bug\"))"
     displayException pair `shouldBe` "stopped by Cancel \"user\", and while stopping: Fault \"bug\""

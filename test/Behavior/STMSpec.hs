@@ -12,7 +12,7 @@ import Support (guarded)
 
 spec :: Spec
 spec = guarded $ do
-  it "waits so that a simulation sees it" $ do
+  it "blocks in a way that is visible to a simulation" $ do
     run <- simulate $ do
       box <- newEmptyTMVarIO
       queue <- newTBQueueIO 1

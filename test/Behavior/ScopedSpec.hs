@@ -1,7 +1,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Behaviours that run beside a scoped one.
+-- Behaviours that are forked in a scope.
 module Behavior.ScopedSpec (spec) where
 
 import Control.Concurrent
@@ -24,7 +24,7 @@ spec = guarded $ do
   it "gives the result of the scoped behaviour" $
     scoped (const (pure 'a')) `shouldReturn` 'a'
 
-  it "gives the results of what was forked" $
+  it "gives the results of forked behaviours" $
     scoped
       ( \nursery -> do
           answers <- for [1 .. 10 :: Int] (fork nursery . pure)
@@ -46,38 +46,38 @@ spec = guarded $ do
       _ <- fork nursery hang :: IO (Child ())
       liveThreadCount `shouldReturn` before' + 1
 
-  it "lets what was forked fork in its turn, and everything end together" $ do
-    (end, done) <- observing $ \notebook -> do
+  it "lets a forked behaviour fork others, and all end together" $ do
+    (end, done) <- observing $ \entries -> do
       inside <- newGate
       let generation nursery n
             | n == 0 = open inside >> hang
             | otherwise = do
                 _ <- fork nursery (generation nursery (n - 1 :: Int))
-                hang `onException` note notebook n
+                hang `onException` note entries n
       scoped $ \nursery -> fork nursery (generation nursery 5) >> pass inside
     end `shouldBe` Gave ()
     done `shouldMatchList` [1 .. 5]
 
   it "stops what was forked when the scoped behaviour ends, and waits for it" $ do
-    (end, done) <- observing $ \notebook ->
+    (end, done) <- observing $ \entries ->
       scoped $ \nursery -> do
         inside <- newGate
-        _ <- fork nursery ((open inside >> hang) `onException` note notebook "cleaned up")
+        _ <- fork nursery ((open inside >> hang) `onException` note entries "cleaned up")
         pass inside
     (end, done) `shouldBe` (Gave (), ["cleaned up"])
 
   it "stops the scoped behaviour and all others when something forked fails, and throws that failure" $ do
-    (end, done) <- observing $ \notebook ->
+    (end, done) <- observing $ \entries ->
       scoped $ \nursery -> do
         inside <- newGate
         there <- newGate
-        _ <- fork nursery ((open inside >> hang) `onException` note notebook "other")
+        _ <- fork nursery ((open inside >> hang) `onException` note entries "other")
         _ <- fork nursery (pass inside >> pass there >> failWith "forked") :: IO (Child ())
-        (open there >> hang) `onException` note notebook "scoped"
+        (open there >> hang) `onException` note entries "scoped"
     end `shouldBe` (FailedWith (show (FailedBecause "forked")) :: Ending ())
     done `shouldMatchList` ["other", "scoped"]
 
-  it "throws the fault of the scoped behaviour before those of the forked, and theirs in their order" $ do
+  it "prefers the fault of the scoped behaviour to those of forked ones, and that of an earlier fork to a later one's" $ do
     let faulty gate name' = (open gate >> hang) `onException` throwIO (Fault name') :: IO ()
         faults theirs own = do
           inside <- newGate
@@ -92,13 +92,13 @@ spec = guarded $ do
     faults ["first", "second"] (throwIO (Fault "scoped")) `shouldReturn` FaultedWith (show (Fault "scoped"))
 
   it "is closed outside: to fork there is a fault, and nothing runs" $ do
-    (end, done) <- observing $ \notebook -> do
+    (end, done) <- observing $ \entries -> do
       nursery <- scoped pure
-      void (fork nursery (note notebook "ran"))
+      void (fork nursery (note entries "ran"))
     (end, done)
       `shouldBe` (FaultedWith "fork: the nursery's scoped behaviour has ended", [])
 
-  it "serves any thread that has the nursery" $
+  it "lets any thread that has the nursery fork" $
     scoped
       ( \nursery -> do
           answer <- newEmptyMVar
@@ -109,25 +109,25 @@ spec = guarded $ do
   it "fails to fork while all is being stopped, in a cleanup of the scoped behaviour or of a child, and nothing runs" $ do
     inside <- newGate
     inside' <- newGate
-    let forking notebook nursery = ending (void (fork nursery (note notebook "forked"))) >>= note notebook . show
-    (end, done) <- observing $ \notebook ->
+    let forking entries nursery = ending (void (fork nursery (note entries "forked"))) >>= note entries . show
+    (end, done) <- observing $ \entries ->
       scoped
         ( \nursery -> do
-            _ <- fork nursery ((open inside' >> hang) `onException` forking notebook nursery) :: IO (Child ())
-            (open inside >> hang) `onException` forking notebook nursery
+            _ <- fork nursery ((open inside' >> hang) `onException` forking entries nursery) :: IO (Child ())
+            (open inside >> hang) `onException` forking entries nursery
         )
         ||| (pass inside >> pass inside')
     let tooLate = FailedWith (show (FailedBecause "fork: the nursery's scoped behaviour is ending")) :: Ending ()
     (end, done) `shouldBe` (Gave (), [show tooLate, show tooLate])
 
-  it "throws the failure of what was forked also if the scoped behaviour is just forking" $
+  it "throws the failure of a forked behaviour also if the scoped behaviour is just forking" $
     for_ [1 .. 300] $ \n -> do
       end <- ending . scoped $ \nursery -> do
         _ <- fork nursery (yielding n >> failed) :: IO (Child ())
         forever (fork nursery (pure ()))
       end `shouldBe` (FailedWith (show Failed) :: Ending ())
 
-  it "gives the scoped behaviour's result also if what was forked is just forking" $
+  it "gives the scoped behaviour's result also if a forked behaviour is just forking" $
     for_ [1 .. 300] $ \n -> do
       end <- ending . scoped $ \nursery -> do
         _ <- fork nursery (forever (fork nursery (pure ()))) :: IO (Child ())
@@ -156,35 +156,35 @@ children = do
         ending (atomically (await child)) `shouldReturn` expected
         (fmap endingOf <$> atomically (tryAwait child)) `shouldReturn` Just expected
 
-  it "gives a cleanup that awaits a child which has failed that failure" $ do
-    (_, done) <- observing $ \notebook ->
+  it "throws the failure of a child that has failed to a cleanup that awaits it" $ do
+    (_, done) <- observing $ \entries ->
       scoped $ \nursery -> do
         inside <- newGate
         child <- fork nursery (pass inside >> failWith "child") :: IO (Child ())
-        (open inside >> hang) `onException` (ending (atomically (await child)) >>= note notebook) :: IO ()
+        (open inside >> hang) `onException` (ending (atomically (await child)) >>= note entries) :: IO ()
     done `shouldBe` [FailedWith (show (FailedBecause "child"))]
 
-  it "gives a cleanup that awaits a child which was stopped with it ChildStopped, when the child's cleanup has ended" $ do
-    (end, done) <- observing $ \notebook ->
+  it "throws ChildStopped to a cleanup that awaits a child which was stopped with it, when the child's cleanup has ended" $ do
+    (end, done) <- observing $ \entries ->
       scoped $ \nursery -> do
         inside <- newGate
         inside' <- newGate
-        one <- fork nursery ((open inside >> hang) `onException` note notebook "its cleanup") :: IO (Child ())
-        _ <- fork nursery $ (open inside' >> hang) `onException` (ending (atomically (await one)) >>= note notebook . show)
+        one <- fork nursery ((open inside >> hang) `onException` note entries "its cleanup") :: IO (Child ())
+        _ <- fork nursery $ (open inside' >> hang) `onException` (ending (atomically (await one)) >>= note entries . show)
         pass inside
         pass inside'
     (end, done) `shouldBe` (Gave (), ["its cleanup", show (stopped :: Ending ())])
 
-  it "stops a child when that is requested; the scoped behaviour goes on" $ do
-    (end, done) <- observing $ \notebook ->
+  it "stops a child when that is requested; the scoped behaviour continues" $ do
+    (end, done) <- observing $ \entries ->
       scoped $ \nursery -> do
         inside <- newGate
-        child <- fork nursery ((open inside >> hang) `onException` note notebook "its cleanup")
+        child <- fork nursery ((open inside >> hang) `onException` note entries "its cleanup")
         other <- fork nursery (pure 'b')
         pass inside
         requestStop child
         ending (atomically (await child)) >>= (`shouldBe` (stopped :: Ending ()))
-        note notebook "goes on"
+        note entries "goes on"
         (,) <$> atomically (await other) <*> (fork nursery (pure 'c') >>= atomically . await)
     (end, done) `shouldBe` (Gave ('b', 'c'), ["its cleanup", "goes on"])
 
@@ -197,7 +197,7 @@ children = do
       putMVar itself child
       ending (atomically (await child)) `shouldReturn` stopped
 
-  it "does not wait for a child that it asks to stop, and serves others meanwhile" $
+  it "does not wait for a child whose stop it requests, and can fork others meanwhile" $
     scoped $ \nursery -> do
       inside <- newGate
       mayEnd <- newGate
@@ -209,29 +209,29 @@ children = do
       open mayEnd
       ending (atomically (await child)) `shouldReturn` stopped
 
-  it "asks a child once, however often that is requested, and also when scoped ends" $ do
-    (end, done) <- observing $ \notebook -> do
+  it "stops a child only once, however often that is requested, and also when scoped ends" $ do
+    (end, done) <- observing $ \entries -> do
       mayEnd <- newGate
       cleaning <- newGate
       let body nursery = do
             inside <- newGate
             -- An interruptible cleanup.
-            child <- fork nursery ((open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note notebook "to its end"))
+            child <- fork nursery ((open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note entries "to its end"))
             pass inside
             requestStop child
             pass cleaning
             requestStop child
-            -- It has been served when this is.
+            -- The request has been handled when this fork has been.
             void (fork nursery (pure ()))
             pure () :: IO ()
-      launching (scoped body) $ \caller -> do
+      withThread (scoped body) $ \caller -> do
         pass cleaning
         stillRunning caller
         open mayEnd
         wait caller
     (end, done) `shouldBe` (Gave (), ["to its end"])
 
-  it "keeps the result of a child that completes although it was asked to stop" $
+  it "keeps the result of a child that completes although its stop was requested" $
     scoped
       ( \nursery -> do
           inside <- newGate
@@ -242,7 +242,7 @@ children = do
       )
       `shouldReturn` 'a'
 
-  it "throws what the cleanup of a child throws that was asked to stop, a fault or a failure" $
+  it "throws the fault or the failure of the cleanup of a child whose stop was requested" $
     for_ [(throwIO (Fault "cleanup"), FaultedWith (show (Fault "cleanup"))), (failWith "cleanup", FailedWith (show (FailedBecause "cleanup")))] $
       \(cleanup, expected) -> do
         end <- ending . scoped $ \nursery -> do
@@ -253,7 +253,7 @@ children = do
           hang
         end `shouldBe` (expected :: Ending ())
 
-  it "throws the failure of another child also when it was asked to stop one" $
+  it "throws the failure of another child also when the stop of one was requested" $
     for_ [1 .. 300 :: Int] $ \n -> do
       end <- ending . scoped $ \nursery -> do
         child <- fork nursery hang :: IO (Child ())
@@ -262,28 +262,28 @@ children = do
         hang
       end `shouldBe` (FailedWith (show (FailedBecause "other")) :: Ending ())
 
-  it "is no fault to request the stop of a child that has ended, while all is being stopped, and outside" $ do
-    (end, done) <- observing $ \notebook -> do
+  it "accepts a stop request for a child that has ended, also while all is being stopped, and outside" $ do
+    (end, done) <- observing $ \entries -> do
       child <- scoped $ \nursery -> do
         ended <- fork nursery (pure 'a')
         _ <- atomically (await ended)
         requestStop ended
         inside <- newGate
-        _ <- fork nursery ((open inside >> hang) `onException` (requestStop ended >> note notebook "went on")) :: IO (Child ())
+        _ <- fork nursery ((open inside >> hang) `onException` (requestStop ended >> note entries "went on")) :: IO (Child ())
         pass inside
         pure ended
       requestStop child
       atomically (await child)
     (end, done) `shouldBe` (Gave 'a', ["went on"])
 
-  it "loses no stop request, whoever makes it" $
+  it "loses no stop request, whichever thread makes it" $
     for_ [1 .. 100 :: Int] $ \_ ->
       scoped $ \nursery -> do
         some <- replicateM 10 (fork nursery hang) :: IO [Child ()]
         for_ some $ \child -> fork nursery (requestStop child)
         for_ some $ \child -> ending (atomically (await child)) `shouldReturn` stopped
 
-  it "is stopped with all others when its scoped behaviour ends as its stop is requested" $
+  it "is stopped with all others when its scoped behaviour ends while its stop is being requested" $
     for_ [1 .. 300 :: Int] $ \n -> do
       (child, requester) <- scoped $ \nursery -> do
         child <- fork nursery hang :: IO (Child ())

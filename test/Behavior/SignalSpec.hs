@@ -1,6 +1,6 @@
 -- |
--- What can be watched: 'Signal.watching', signals made of several, and
--- 'Signal.withShared'. Polled signals, and refined ones, have specs of their own.
+-- 'Signal.watching', signals made of several, and 'Signal.withShared'. Polled signals and
+-- filters have specs of their own.
 module Behavior.SignalSpec (spec) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -25,34 +25,34 @@ spec = guarded $ do
 
 watchingIt :: Spec
 watchingIt = do
-  it "waits for a first value, and later takes its absence for an end" $ do
-    condition <- newTVarIO SaysNothing
+  it "waits for a first value, and later fails when there is none" $ do
+    condition <- newTVarIO NoValue
     entered <- newGate
-    launching (Signal.rSelect (watched condition) (open entered >> hang) hang) $ \caller -> do
+    withThread (Signal.rSelect (watched condition) (open entered >> hang) hang) $ \caller -> do
       stillRunning caller
-      set condition (Says True)
+      set condition (Value True)
       pass entered
-      set condition SaysNothing
+      set condition NoValue
       awaitEnd caller `shouldReturn` lost
 
-  it "is not misled by a value that is back by the time it looks" $ do
+  it "is not affected when one transaction removes and restores the value" $ do
     condition <- newTestCondition True
     entered <- newGate
-    let branch = open entered >> atomically (readTVar condition >>= check . (== Says False)) >> hang
-        -- The value goes and comes in one transaction: nobody can see it gone.
-        flicker = atomically (writeTVar condition SaysNothing >> writeTVar condition (Says True))
-    launching (Signal.rSelect (watched condition) branch (pure "right")) $ \caller -> do
+    let branch = open entered >> atomically (readTVar condition >>= check . (== Value False)) >> hang
+        -- No other transaction can read in between.
+        flicker = atomically (writeTVar condition NoValue >> writeTVar condition (Value True))
+    withThread (Signal.rSelect (watched condition) branch (pure "right")) $ \caller -> do
       pass entered
       flicker
       stillRunning caller
-      set condition (Says False)
+      set condition (Value False)
       awaitEnd caller `shouldReturn` Gave "right"
  where
   lost = FailedWith "FailedBecause \"the signal has no value any more\"" :: Ending ()
 
 several :: Spec
 several = do
-  prop "a pure one is the function applied to the values" $ \f x y ->
+  prop "pure ones is the function applied to their values" $ \f x y ->
     let g = if f then (+) else (-) :: Int -> Int -> Int
         constant = pure :: Int -> Signal.Signal Int
      in ioProperty $ (=== g x y) <$> Signal.switch (g <$> constant x <*> constant y) pure
@@ -61,7 +61,7 @@ several = do
     first <- newTVarIO Nothing
     second <- newTVarIO Nothing
     let given variable = Signal.watching (readTVar variable >>= maybe retry pure)
-    launching (Signal.switch ((,) <$> given first <*> given second) pure) $ \caller -> do
+    withThread (Signal.switch ((,) <$> given first <*> given second) pure) $ \caller -> do
       stillRunning caller
       atomically (writeTVar first (Just 'a'))
       stillRunning caller
@@ -69,24 +69,24 @@ several = do
       awaitEnd caller `shouldReturn` Gave ('a', 'b')
 
   it "changes once when one transaction changes several" $ do
-    book <- newLog
+    entries <- newLog
     first <- newTVarIO (0 :: Int)
     second <- newTVarIO (0 :: Int)
     let branch key = do
-          note book key
+          note entries key
           unless (fst key == 50) $ do
             atomically (modifyTVar' first (+ 1) >> modifyTVar' second (+ 1))
             hang
-    Signal.switch ((,) <$> dialled first <*> dialled second) branch
-    notes book `shouldReturn` [(n, n) | n <- [0 .. 50]]
+    Signal.switch ((,) <$> watchedVar first <*> watchedVar second) branch
+    notes entries `shouldReturn` [(n, n) | n <- [0 .. 50]]
 
-  it "asks a sensor once for each of its occurrences" $ do
+  it "polls a sensor in a thread for each of its occurrences" $ do
     level <- newSensor pure
     polled <- started (Signal.waitUntil ((\a b c -> a + b + c > 6) <$> sensing level <*> sensing level <*> sensing level))
     polled `shouldBe` replicate 3 (Label "waitUntil" "polling")
 
   it "can differ from itself, when it is not shared" $ do
-    -- Each reading is another; so two sensors' readings never agree.
+    -- Each reading has another number; so two threads' readings are never equal.
     level <- newSensor pure
     Signal.waitUntil ((/=) <$> sensing level <*> sensing level)
 
@@ -103,24 +103,24 @@ sharing = do
     let body n s = Signal.rSelect s (play n l) (play n r)
      in (Signal.withShared (pure c) . body) `sameAs` (\n -> body n (pure c))
 
-  it "reads a sensor once for all occurrences, which always agree" $ do
+  it "polls a sensor in one thread for all occurrences, which are always equal" $ do
     level <- newSensor pure
     labels <- started . Signal.withShared (sensing level) $ \s ->
       Signal.whileHolding ((==) <$> s <*> s) (readingsBeyond 50 level)
     filter ((== "polling") . labelBranch) labels `shouldBe` [Label "withShared" "polling"]
 
-  it "reads a sensor once for several operators at once" $ do
+  it "polls a sensor in one thread for several operators at once" $ do
     level <- newSensor (pure . (> 10))
     labels <- started . Signal.withShared (sensing level) $ \s ->
       both (Signal.waitUntil s) (Signal.waitUntil s)
     filter ((== "polling") . labelBranch) labels `shouldBe` [Label "withShared" "polling"]
 
-  it "goes on reading while an operator inside recovers" $ do
+  it "continues reading while an operator inside recovers" $ do
     level <- newSensor pure
     recovered <- newTVarIO False
     Signal.withShared (sensing level) $ \s ->
       Signal.monitor
-        ((\n isRecovered -> n > 0 && not isRecovered) <$> s <*> dialled recovered)
+        ((\n isRecovered -> n > 0 && not isRecovered) <$> s <*> watchedVar recovered)
         (readingsBeyond 10 level >> atomically (writeTVar recovered True))
         (pure ())
 
@@ -129,9 +129,9 @@ sharing = do
     Signal.withShared (Signal.polling 0.001 (throwIO (Failure "no echo"))) (\s -> (,) <$> attempted s <*> attempted s)
       `shouldReturn` ("failed", "failed")
 
-  it "keeps a memory for all operators inside" $ do
+  it "keeps one memory for all operators inside" $ do
     level <- newTVarIO (95 :: Int)
-    Signal.withShared (Signal.hysteresis False 10 90 (dialled level)) $ \s -> do
+    Signal.withShared (Signal.hysteresis False 10 90 (watchedVar level)) $ \s -> do
       Signal.waitUntil s
       atomically (writeTVar level 50)
       Signal.rSelect s (pure "left") (pure "right") `shouldReturn` "left"
@@ -142,7 +142,7 @@ sharing = do
         masked (Signal.withShared (pure ()) (const getMaskingState)) `shouldReturn` Unmasked
 
   for_ [minBound .. maxBound] $ \how ->
-    it ("ends its sensors with the body, also one that is " ++ show how) $ do
+    it ("stops its sensors when the body ends, also one that is " ++ show how ++ " when stopped") $ do
       entered <- newGate
       level <- newSensor $ \_ -> onStop how "reading" (open entered >> hang)
       end <- ending (Signal.withShared (sensing level) (\_ -> pass entered >> pure "body"))
@@ -151,7 +151,7 @@ sharing = do
         _ -> Gave "body"
 
   for_ [minBound .. maxBound] $ \how ->
-    it ("is cancelled with its body and sensors, when the body is " ++ show how) $ do
+    it ("is cancelled with its body and sensors, when the body is " ++ show how ++ " when stopped") $ do
       entered <- newGate
       level <- newSensor (const hang)
       let act = Signal.withShared (sensing level) $ \s ->
@@ -161,17 +161,17 @@ sharing = do
         Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "body"))
         _ -> CancelledBy (show (Cancel "the caller"))
 
-  it "throws the body's fault before a sensor's" $ do
+  it "throws the body's fault rather than a sensor's" $ do
     entered <- newGate
     level <- newSensor $ \_ -> onStop Faulting "reading" (open entered >> hang)
     ending (Signal.withShared (sensing level) (\_ -> pass entered >> throwIO (Fault "body")))
       `shouldReturn` (FaultedWith (show (Fault "body")) :: Ending ())
 
   it "is closed when the body has ended: to use it then is a fault, and starts nothing" $ do
-    book <- newLog
+    entries <- newLog
     leaked <- Signal.withShared (pure True) pure
-    ending (Signal.rSelect leaked (note book "left") (note book "right")) `shouldReturn` closed
-    notes book `shouldReturn` []
+    ending (Signal.rSelect leaked (note entries "left") (note entries "right")) `shouldReturn` closed
+    notes entries `shouldReturn` []
 
   it "closes also for an operator that still watches it from outside" $ do
     leaked <- newEmptyTMVarIO
@@ -181,15 +181,15 @@ sharing = do
         outside = do
           s <- atomically (takeTMVar leaked)
           Signal.rSelect s (open watching >> hang) (pure ()) `onException` open over
-    launching outside $ \caller -> do
+    withThread outside $ \caller -> do
       Signal.withShared (pure True) body
       awaitEnd caller `shouldReturn` closed
     opened over `shouldReturn` True
 
   it "refuses a bad signal before it starts the body" $ do
-    book <- newLog
-    ending (Signal.withShared (Signal.polling 0 (pure ())) (\_ -> note book "body"))
+    entries <- newLog
+    ending (Signal.withShared (Signal.polling 0 (pure ())) (\_ -> note entries "body"))
       `shouldReturn` FaultedWith "polling: a period is at least 0.000001 seconds, not 0.0"
-    notes book `shouldReturn` []
+    notes entries `shouldReturn` []
  where
   closed = FaultedWith "withShared: the shared signal was used outside its behaviour" :: Ending ()

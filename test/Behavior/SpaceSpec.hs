@@ -16,7 +16,7 @@ import Memory (inConstantMemory)
 import Support
 
 spec :: Spec
-spec = guarded . describe "In constant memory run" $ do
+spec = guarded . describe "In constant memory:" $ do
   it "a million failed alternatives, nested to the right by ?" $
     inConstantMemory 1000000 $ \step ->
       foldr (\act others -> (act >> failed) ? others) (pure ()) (replicate 1000000 step)

@@ -1,10 +1,10 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- An operator does not wait for what waits for it: a cleanup that throws to the operator's
--- caller, once. (A second exception, or one for a caller that was stopped already or is
--- masked, is pending until the operator ends: a cleanup has a thread of its own throw it.)
--- And two limits of time that expire meanwhile do what they do in GHC.
+-- An operator does not deadlock with a cleanup that throws to the operator's caller, once.
+-- (A second exception, or one for a caller that was stopped already or is masked, is pending
+-- until the operator ends: a cleanup has to throw it in a thread of its own.) And two time
+-- limits that expire meanwhile behave as in plain GHC.
 module Behavior.ThrowingCleanupSpec (spec) where
 
 import Control.Concurrent (ThreadId, forkIO, killThread, myThreadId)
@@ -26,10 +26,11 @@ import Support hiding (End (..))
 spec :: Spec
 spec = guarded $ do
   describe "A cleanup that throws to the operator's caller" fromCleanups
-  describe "A branch that is slow to hear that it is to stop" slowToHear
+  describe "A branch that is uninterruptible when its stop is requested" uninterruptibleBranch
   describe "Two limits that expire while an operator waits for a cleanup" limits
 
--- | Each operator, with a first branch that goes on, and what makes it stop that.
+-- | Each operator, with a branch that runs on, and an action whose end makes the operator
+-- stop that branch.
 operators, forTwo :: [(String, Behavior () -> Behavior () -> Behavior ())]
 forTwo =
   [ ("parallel", flip parallel)
@@ -47,7 +48,7 @@ operators =
        , ("withShared in timeout", \act enough -> timeout 3600 (Signal.withShared (pure ()) (const act) ||| enough))
        ]
  where
-  -- A signal that is true until then.
+  -- A signal that is true until the action ends.
   condition enough body = do
     over <- newTVarIO False
     body (not <$> Signal.watching (readTVar over)) ||| (enough >> atomically (writeTVar over True) >> hang)
@@ -56,30 +57,30 @@ fromCleanups :: Spec
 fromCleanups = do
   for_ operators $ \(name, operator) ->
     for_ masks $ \(manner, masked) -> do
-      it (name ++ ", " ++ manner ++ ": the operator ends, and what was thrown gets out") $
+      it (name ++ ", " ++ manner ++ ": the operator ends, and throws that exception") $
         stopping operator (masked . eStop) `shouldReturn` FaultedWith (show (Fault "e-stop"))
-      it (name ++ ", " ++ manner ++ ", by a thread of its own: likewise, and the second after it") $
+      it (name ++ ", " ++ manner ++ ", and again by a thread of its own: the operator ends, and throws the first exception") $
         stopping operator (\me -> masked (eStop me >> void (forkIO (throwTo me (Cancel "again")))))
           `shouldReturn` FaultedWith (show (Fault "e-stop"))
-      it (name ++ ", " ++ manner ++ ", by a thread of its own, when the caller was cancelled: ends by that") $ do
+      it (name ++ ", " ++ manner ++ ", by a thread of its own, when the caller was cancelled: the operator ends as cancelled") $ do
         entered <- newGate
-        end <- launching (do me <- myThreadId; operator (branch entered (masked (void (forkIO (eStop me))))) hang) $ \caller -> do
+        end <- withThread (do me <- myThreadId; operator (branch entered (masked (void (forkIO (eStop me))))) hang) $ \caller -> do
           pass entered
           throwing (asyncThreadId caller) (Cancel "the caller")
           awaitEnd caller
         end `shouldBe` CancelledBy (show (Cancel "the caller"))
 
-  it "storms of them, by threads of their own, in nested operators: all end, and nothing is orphaned" $
+  it "in nested operators, many of them, by threads of their own: all end, and no branch is left" $
     replicateM_ 20 $ do
       gates <- mapM (const newGate) [1 .. 4 :: Int]
       occupancy <- newTVarIO (0 :: Int)
-      end <- launching (do
+      end <- withThread (do
         me <- myThreadId
         let throwing' target e = void (forkIO (throwTo target (Fault e)))
-            stormy n cleanup = counted occupancy (branch (gates !! n) cleanup)
+            one n cleanup = counted occupancy (branch (gates !! n) cleanup)
             nested n m = do
               self <- myThreadId
-              parallel (stormy n (throwing' self "inner")) (stormy m (throwing' me "outer"))
+              parallel (one n (throwing' self "inner")) (one m (throwing' me "outer"))
         parallel (for_ gates pass) (both (nested 0 1) (nested 2 3))) awaitEnd
       end `shouldSatisfy` \case
         Gave () -> True
@@ -96,38 +97,38 @@ fromCleanups = do
   branch entered cleanup = (open entered >> hang) `onException` cleanup
   stopping operator cleanup = do
     entered <- newGate
-    launching (myThreadId >>= \me -> operator (branch entered (cleanup me)) (pass entered)) awaitEnd
+    withThread (myThreadId >>= \me -> operator (branch entered (cleanup me)) (pass entered)) awaitEnd
   counted occupancy act =
     mask $ \restore -> do
       atomically (readTVar occupancy >>= writeTVar occupancy . (+ 1))
       restore act `finally` uninterruptibleMask_ (atomically (readTVar occupancy >>= writeTVar occupancy . subtract 1))
 
--- | Its operator asks it, and is interrupted before it has heard.
-slowToHear :: Spec
-slowToHear =
+-- | The operator requests the stop, and is interrupted before the branch has received it.
+uninterruptibleBranch :: Spec
+uninterruptibleBranch =
   for_ forTwo $ \(name, operator) ->
-    it (name ++ ": hears of it, though the caller was interrupted meanwhile") $ do
+    it (name ++ ": receives the request, though the caller was interrupted meanwhile") $ do
       entered <- newGate
-      mayHear <- newGate
-      end <- launching (operator (uninterruptibleMask_ (open entered >> pass mayHear) >> hang) (pass entered)) $ \caller -> do
+      mayStop <- newGate
+      end <- withThread (operator (uninterruptibleMask_ (open entered >> pass mayStop) >> hang) (pass entered)) $ \caller -> do
         eventually ((== ThreadBlocked BlockedOnException) <$> threadStatus (asyncThreadId caller))
         throwing (asyncThreadId caller) (Cancel "the caller")
-        open mayHear
+        open mayStop
         awaitEnd caller
       end `shouldBe` CancelledBy (show (Cancel "the caller"))
 
--- | As they are with what GHC itself cannot interrupt.
+-- | They behave as around an action that GHC itself cannot interrupt.
 limits :: Spec
 limits =
   for_ [("the inner one first", False), ("the outer one first", True)] $ \(order, outerFirst) -> do
     for_ operators $ \(name, operator) ->
-      it (name ++ ", " ++ order ++ ": the outer one ends it, and none reaches what comes after") $ do
+      it (name ++ ", " ++ order ++ ": the outer one ends it, and neither is received after it") $ do
         entered <- newGate
         mayEnd <- newGate
         stopping <- newGate
         expired outerFirst stopping mayEnd $
           operator ((open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd)) (pass entered)
-    it ("and what GHC cannot interrupt, " ++ order) $ do
+    it ("an action that GHC cannot interrupt, " ++ order ++ ": the outer one ends it, and neither is received after it") $ do
       mayEnd <- newGate
       stopping <- newGate
       expired outerFirst stopping mayEnd (uninterruptibleMask_ (open stopping >> pass mayEnd))
@@ -137,22 +138,22 @@ expired outerFirst stopping mayEnd act = do
   inner <- newLimit
   outer <- newLimit
   later <- newGate
-  book <- newLog
+  entries <- newLog
   let caller = do
-        result <- limited outer (limited inner act >>= \r -> note book "between" >> pure r)
+        result <- limited outer (limited inner act >>= \r -> note entries "between" >> pure r)
         open later
         mapM_ (\_ -> pass later) [1 .. 100 :: Int]
         pure result
-  end <- launching caller $ \running -> do
+  end <- withThread caller $ \running -> do
     pass stopping
     for_ (if outerFirst then [outer, inner] else [inner, outer]) expire
     open mayEnd
     awaitEnd running
   end `shouldBe` Gave Nothing
-  notes book `shouldReturn` []
+  notes entries `shouldReturn` []
 
--- | A limit that expires when it is told to, not by the clock: otherwise it is
--- 'System.Timeout.timeout'.
+-- | A limit like 'System.Timeout.timeout', but one that expires when the test triggers it,
+-- not by the clock.
 data Limit = Limit Gate (Gate, ThreadIdBox)
 
 type ThreadIdBox = Log ThreadId
@@ -184,7 +185,7 @@ limited (Limit trigger (set, box)) act = do
     body `catch` \(Expired thrower) ->
       readTVarIO own >>= \mine -> if mine == Just thrower then pure Nothing else throwIO (Expired thrower)
 
--- | Has it expire. Returns when its exception was received, or is pending.
+-- | Makes the limit expire. Returns when its exception was received, or is pending.
 expire :: Limit -> IO ()
 expire (Limit trigger (set, box)) = do
   pass set

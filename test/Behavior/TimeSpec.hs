@@ -21,8 +21,8 @@ import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, si
 import Behavior.Time
 import Support
 
--- | Where real time passes in here it is never more than a few milliseconds, and no
--- example depends on how fast the machine is.
+-- | Where real time passes here, it is never more than a few milliseconds, and no example
+-- depends on how fast the machine is.
 spec :: Spec
 spec = guarded $ do
   describe "Seconds" lengths
@@ -33,7 +33,7 @@ spec = guarded $ do
   describe "sleep" sleeping
   describe "timeout" timeouts
 
--- | In a simulation: there no time passes before a behaviour has begun.
+-- | Runs it in a simulation, where no time passes before a behaviour has begun.
 virtually :: Behavior a -> IO a
 virtually act =
   simulate act >>= \run -> case outcome run of
@@ -71,7 +71,7 @@ lengths = do
       timeout s (pure ()) `shouldThrow` isRefusal "timeout: a duration is zero or more seconds, not " s
       duration "x" s `shouldThrow` isRefusal "x: a duration is zero or more seconds, not " s
 
-  it "must be at least a microsecond where a period is asked for" $ do
+  it "must be at least a microsecond where a period is required" $ do
     for_ [0, -1, notANumber, 5e-324, 0.0000009] $ \s ->
       period "x" s `shouldThrow` isRefusal "x: a period is at least 0.000001 seconds, not " s
     for_ [0.000001, 0.001, infinite] $ \s -> period "x" s `shouldReturn` s
@@ -83,7 +83,7 @@ sleeping = do
   it "returns at once for zero seconds, even under uninterruptibleMask" $
     uninterruptibleMask_ (sleep 0)
 
-  it "for zero seconds lets no other thread run in between, in a simulation" $
+  it "for zero seconds does not let another thread run in between, in a simulation" $
     void . explore (randomly 100) $ \simulated -> do
       written <- newIORef ""
       found <- newIORef ""
@@ -91,14 +91,14 @@ sleeping = do
       _ <- simulated (both left (writeIORef written "right"))
       readIORef found `shouldReturn` "left"
 
-  it "takes at least as long as it was told to" $
+  it "takes at least the given time" $
     for_ [0.0001, 0.001, 0.003] $ \s -> do
       start <- now
       sleep s
       end <- now
       end - start `shouldSatisfy` (>= s)
 
-  it "goes on until the moment has come, and not at all when it has gone" $ do
+  it "until a given time ends at that time, or at once when it is past" $ do
     moment <- (+ 0.002) <$> now
     sleepUntil moment
     now >>= (`shouldSatisfy` (>= moment))
@@ -106,7 +106,7 @@ sleeping = do
 
   it "can be interrupted, however long it would take" $
     for_ [3600, 1.0e30, infinite] $ \s -> do
-      launching (sleep s) $ \sleeper -> do
+      withThread (sleep s) $ \sleeper -> do
         awaitIdle (asyncThreadId sleeper)
         throwTo (asyncThreadId sleeper) (Cancel "the sleeper")
         awaitEnd sleeper `shouldReturn` CancelledBy (show (Cancel "the sleeper"))
@@ -115,8 +115,8 @@ timeouts :: Spec
 timeouts = do
   it "changes nothing for a behaviour that is in time" $
     property $ \a ->
-      sameAs (\notebook -> timeout 3600 (play notebook a)) (`play` a)
-        .&&. sameAs (\notebook -> timeout infinite (play notebook a)) (`play` a)
+      sameAs (\entries -> timeout 3600 (play entries a)) (`play` a)
+        .&&. sameAs (\entries -> timeout infinite (play entries a)) (`play` a)
 
   it "fails with TimedOut, which can be caught by ?, when the behaviour takes longer" $ do
     timeout 0.001 hang `shouldThrow` (== TimedOut 0.001)
@@ -124,22 +124,22 @@ timeouts = do
     displayException (TimedOut 0.5) `shouldBe` "timed out after 0.5 s"
 
   it "does not start the behaviour when there is no time at all" $
-    observing (\notebook -> timeout 0 (note notebook 'a'))
+    observing (\entries -> timeout 0 (note entries 'a'))
       `shouldReturn` (FailedWith (show (TimedOut 0)), "")
 
-  it "does not start it then under any schedule" . void . explore (randomly 100) $ \simulated -> do
-    notebook <- newLog
-    _ <- simulated (timeout 0 (note notebook 'a'))
-    notes notebook `shouldReturn` ""
+  it "does not start the behaviour when there is no time at all, under any schedule" . void . explore (randomly 100) $ \simulated -> do
+    entries <- newLog
+    _ <- simulated (timeout 0 (note entries 'a'))
+    notes entries `shouldReturn` ""
 
   it "returns when the behaviour has ended, however slow its cleanup" $ do
-    (end, said) <- observing $ \notebook ->
+    (end, done) <- observing $ \entries ->
       virtually $ do
-        ended <- try (timeout 1 (uninterruptibly (sleep 3600) (sleep 5 >> note notebook "cleaned up")))
+        ended <- try (timeout 1 (uninterruptibly (sleep 3600) (sleep 5 >> note entries "cleaned up")))
         (,) (ended :: Either TimedOut ()) <$> now
-    (end, said) `shouldBe` (Gave (Left (TimedOut 1), 6), ["cleaned up"])
+    (end, done) `shouldBe` (Gave (Left (TimedOut 1), 6), ["cleaned up"])
 
-  it "keeps a result that the behaviour returns although it was asked to stop" $
+  it "keeps a result that the behaviour returns although its stop was requested" $
     virtually (timeout 1 ((sleep 3600 >> pure 'b') `catch` \(_ :: SomeAsyncException) -> pure 'a')) `shouldReturn` 'a'
 
   it "throws a failure or a fault of the cleanup instead of its own failure" $ do
@@ -148,14 +148,14 @@ timeouts = do
     virtually (timeout 1 (sleep 3600 `onException` throwIO (Fault "cleanup") :: IO ()))
       `shouldThrow` (== Fault "cleanup")
 
-  it "does not ask again, when it is cancelled, a behaviour that it asked when time was up" $
+  it "makes no second stop request when it is cancelled after the time was up" $
     observing
-      ( \notebook ->
-          virtually (timeout 3 (timeout 1 (sleep 3600 `onException` (sleep 5 >> note notebook "cleaned up"))))
+      ( \entries ->
+          virtually (timeout 3 (timeout 1 (sleep 3600 `onException` (sleep 5 >> note entries "cleaned up"))))
       )
       `shouldReturn` (FailedWith (show (TimedOut 3)) :: Ending (), ["cleaned up"])
 
-  it "is told apart from the timeouts around and within it" $ do
+  it "is distinguished from the timeouts around and inside it" $ do
     timeout 3600 (timeout 0.001 hang) `shouldThrow` (== TimedOut 0.001)
     timeout 0.001 (timeout 3600 hang) `shouldThrow` (== TimedOut 0.001)
     timeout 3600 (timeout 0.001 hang ? pure 'b') `shouldReturn` 'b'
@@ -164,27 +164,27 @@ timeouts = do
     System.timeout 1000 (timeout 3600 hang ? pure 'b') `shouldReturn` Nothing
     timeout 0.001 (System.timeout 3600000000 hang) `shouldThrow` (== TimedOut 0.001)
 
-  it "counts from when it is run, each time" $ do
+  it "measures its time from when it is run, each time" $ do
     let limited = timeout 0.001
     virtually ((limited hang ? pure ()) >> limited (pure 'a')) `shouldReturn` 'a'
 
-  it "counts from when it is called, however late its clock starts" $
+  it "measures its time from the call, however late its clock starts" $
     eventually $ do
       begun <- now
       let timeIsUp = (>= begun + 0.02) <$> now
           startingLate event = when (event == Started (Label "timeout" "clock")) (eventually timeIsUp)
       withSink startingLate (timeout 0.02 hang) `shouldThrow` (== TimedOut 0.02)
       ended <- now
-      -- (If the machine was too slow, that says nothing: then once more.)
+      -- (If the machine was too slow, the result means nothing: then try again.)
       pure (ended < begun + 0.04)
 
-  it "sees what is written in the transactions that it waits for" $ do
+  it "makes what its behaviour has written visible when it returns" $ do
     var <- newTVarIO 'a'
     timeout 3600 (atomically (writeTVar var 'b'))
     atomically (readTVar var) `shouldReturn` 'b'
 
   it "labels its two threads, the branch and the clock" $ do
-    (_, events) <- observing $ \notebook -> withSink (note notebook) (timeout 3600 (pure ()))
+    (_, events) <- observing $ \entries -> withSink (note entries) (timeout 3600 (pure ()))
     [started | Started started <- events]
       `shouldMatchList` [Label "timeout" "branch", Label "timeout" "clock"]
 

@@ -1,8 +1,8 @@
 -- |
--- Waking at a given time, for all who sleep.
+-- The timer wheel: sleeping until a given time, by many threads.
 --
--- Real time passes in here, but little of it; what is said of it are lower bounds, and that
--- it ends.
+-- A little real time passes here; only lower bounds of it are tested, and that each sleep
+-- ends.
 module Behavior.TimerWheelSpec (spec) where
 
 import Control.Concurrent (myThreadId, yield)
@@ -24,11 +24,11 @@ import Support
 spec :: Spec
 spec = guarded $ do
   describe "A slot" slots
-  describe "Who sleeps" sleepers
-  describe "Of those who sleep" many
+  describe "A sleep" sleeps
+  describe "Many sleeps" many
 
--- | The slots that follow one another, from the first that was slept to; who is so much of
--- a period late is still in time for the next one.
+-- | The consecutive slots, from the given one on, of a thread that is late by the given
+-- part of a period each time, which is still in time for the next slot.
 slotsOf :: Double -> Double -> Double -> [Double]
 slotsOf period late = iterate $ \slot -> slotTime period (slot + late * period) (slot + period)
 
@@ -47,28 +47,28 @@ slots = do
           drift = slotsOf period late first !! 1000 - (first + 1000 * period)
        in counterexample (show drift) $ abs drift < 1e-6
 
-  prop "begins when it was asked for, or at most a tenth of the period later" $
+  prop "begins at the requested time, or at most a tenth of the period later" $
     forAll ((,,) <$> periods <*> choose (0, 1) <*> times) $ \(period, ahead, t) ->
       let to = t + ahead * period
           slot = slotTime period t to
-       in -- (A microsecond is less than it takes to be woken.)
+       in -- (A microsecond is less than a wakeup takes.)
           counterexample (show (slot - to)) $ slot >= to - 1e-6 && slot <= to + max 0.000125 (period / 10)
 
-  prop "is one of ten in a period, for all whose period is a round number" $
+  prop "is one of ten in a period, for all periods that are round numbers" $
     forAll ((,) <$> elements roundOnes <*> vectorOf 1000 times) $ \(period, ts) ->
       let phase t = round (slotTime period t (t + period) * 8000) `mod` (round (period * 8000) :: Int)
        in length (nub (map phase ts)) <= 10
 
-  it "that has begun already is not slept for" $
+  it "that has begun already is not awaited" $
     slotTime 0.1 5.01 5.003 `shouldBe` 5.003
  where
   roundOnes = [0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 7.3]
   periods = oneof [choose (0.001, 10), elements roundOnes]
   times = choose (0, 1000000)
 
-sleepers :: Spec
-sleepers = do
-  modifyMaxSuccess (const 5) . prop "wakes, and never before the time, among many who sleep" $
+sleeps :: Spec
+sleeps = do
+  modifyMaxSuccess (const 5) . prop "ends, and never before its time, among many others" $
     forAll (vectorOf 500 (choose (0, 0.02))) $ \seconds ->
       ioProperty $ do
         early <- forConcurrently seconds $ \s -> do
@@ -77,7 +77,7 @@ sleepers = do
           subtract (t + s) <$> getMonotonicTime
         pure (filter (< 0) early === [])
 
-  modifyMaxSuccess (const 5) . prop "for a slot wakes, and never before it begins" $
+  modifyMaxSuccess (const 5) . prop "until a slot ends, and never before the slot begins" $
     forAll (vectorOf 100 (choose (0.001, 0.02))) $ \periods ->
       ioProperty $ do
         early <- forConcurrently periods $ \period -> do
@@ -86,17 +86,17 @@ sleepers = do
           subtract slot <$> getMonotonicTime
         pure (filter (< 0) early === [])
 
-  it "for a slot gives the time at which that begins, and not the one that was asked for" $ do
+  it "until a slot gives the time at which the slot begins, and not the one that was requested" $ do
     t <- getMonotonicTime
     sleepToSlot 0.01 t (t + 0.003) `shouldReturn` slotTime 0.01 t (t + 0.003)
 
-  it "for more than a second does not wake after one" $ do
+  it "for more than a second does not end after one" $ do
     t <- getMonotonicTime
     -- (As if the sleep had begun earlier: the second is over soon.)
     sleepBetween (t - 0.999) (t + 0.05)
     getMonotonicTime >>= (`shouldSatisfy` (>= t + 0.05))
 
-  it "for less than a twentieth of a second uses next to no processor time" $ do
+  it "for less than a twentieth of a second uses almost no processor time" $ do
     costs <- replicateM 5 $ do
       begun <- getCPUTime
       t <- getMonotonicTime
@@ -105,11 +105,11 @@ sleepers = do
     let picosecondsInAMillisecond = 1000000000
     minimum costs `shouldSatisfy` (< 5 * picosecondsInAMillisecond)
 
-  it "until an earlier time than all others wakes before them" $
+  it "until an earlier time than all others ends before them" $
     replicateM_ 3 . eventually $ do
-      -- (If the machine has slept too long itself, that says nothing: then once more.)
+      -- (If the machine was too slow, the result means nothing: then try again.)
       t <- getMonotonicTime
-      launching (sleepBetween t (t + 0.1)) $ \other -> do
+      withThread (sleepBetween t (t + 0.1)) $ \other -> do
         awaitIdle (asyncThreadId other)
         t' <- getMonotonicTime
         sleepBetween t' (t' + 0.001)
@@ -117,7 +117,7 @@ sleepers = do
         awaitEnd other `shouldReturn` Gave ()
         pure (woken < t + 0.1)
 
-  it "can be interrupted: it is gone at once, and the others of the same moment wake" $ do
+  it "can be interrupted: it ends at once, and other sleeps until the same time still end" $ do
     t <- getMonotonicTime
     let to = t + 0.05
     sleeping <- replicateM 5 (async (sleepBetween t to >> getMonotonicTime))
@@ -131,57 +131,58 @@ sleepers = do
   it "for ever can be interrupted" $ do
     t <- getMonotonicTime
     for_ [sleepBetween t (1 / 0), void (sleepToSlot (1 / 0) t (1 / 0))] $ \act ->
-      launching act $ \sleeper -> do
+      withThread act $ \sleeper -> do
         awaitIdle (asyncThreadId sleeper)
         stillRunning sleeper
         cancel sleeper
 
-  it "for ever does not wake, however long ago it began" $ do
+  it "for ever does not end, however long ago it began" $ do
     t <- getMonotonicTime
     let aYearAgo = t - 3e7
-    launching (sleepBetween aYearAgo (1 / 0)) $ \sleeper -> do
+    withThread (sleepBetween aYearAgo (1 / 0)) $ \sleeper -> do
       awaitIdle (asyncThreadId sleeper)
-      -- It has waited at the same gates, all of which have opened by now, and at its own.
+      -- This one has waited in the same buckets, all of which have expired by now, and in
+      -- its own.
       sleepBetween aYearAgo t
       stillRunning sleeper
 
   for_ [0, -1, -1 / 0] $ \seconds ->
-    it ("for " ++ show seconds ++ " s does not wait: nothing can come in between") $ do
-      book <- newLog
+    it ("for " ++ show seconds ++ " s does not block, so that nothing can interrupt it") $ do
+      entries <- newLog
       let act = mask_ $ do
             self <- myThreadId
             throwing self (Cancel "the sleeper")
             t <- getMonotonicTime
             sleepBetween t (t + seconds)
             _ <- sleepToSlot 0.01 t (t + seconds)
-            note book "went on"
-      _ <- launching act awaitEnd
-      notes book `shouldReturn` ["went on"]
+            note entries "went on"
+      _ <- withThread act awaitEnd
+      notes entries `shouldReturn` ["went on"]
 
 many :: Spec
 many = do
-  it "none is forgotten, however many come and go" $ do
+  it "all end, however many begin and end" $ do
     lengths <- generate (vectorOf 1000 (vectorOf 20 (choose (0, 0.002))))
     forConcurrently_ lengths . mapM_ $ \s ->
       getMonotonicTime >>= \t -> sleepBetween t (t + s)
 
-  it "none is forgotten when others who wanted to wake at the same times are interrupted" $ do
+  it "all end when others until the same times are interrupted" $ do
     lengths <- generate (vectorOf 200 (vectorOf 10 (choose (0, 0.002))))
     (`mapConcurrently_` lengths) . mapM_ $ \s -> do
       t <- getMonotonicTime
-      launching (sleepBetween t (t + s)) $ \_ -> sleepBetween t (t + s / 2)
+      withThread (sleepBetween t (t + s)) $ \_ -> sleepBetween t (t + s / 2)
       sleepBetween t (t + s)
 
-  it "none is forgotten when others are interrupted just as they lie down" $
+  it "all end when others are interrupted just as they begin" $
     for_ [1 .. 300 :: Int] $ \n -> do
       t <- getMonotonicTime
       for_ [1 .. 10] $ \k ->
-        launching (sleepBetween t (t + 0.002 - k / 8000)) $ \_ ->
+        withThread (sleepBetween t (t + 0.002 - k / 8000)) $ \_ ->
           replicateM_ (n `mod` 7) yield
       when (n `mod` 10 == 0) $ sleepBetween t (t + 0.003)
 
-  -- (Always somebody sleeps, so that one clock goes off again and again.)
-  it "wake by a clock that needs no more memory the longer it goes" $
+  -- (At each time a thread sleeps, so that one armed timer expires again and again.)
+  it "use an armed timer that needs no more memory the longer it is in use" $
     growingByLessThan 20000 400 $ \step -> do
       t <- getMonotonicTime
       forConcurrently_ [1 .. 40] $ \k -> do
@@ -190,20 +191,20 @@ many = do
           t' <- getMonotonicTime
           sleepBetween t' (t' + 0.04) >> step
 
-  it "wake by one clock, however many come and go while another sleeps long" $
+  it "use one armed timer, however many begin and end during another long one" $
     growingByLessThan 20000 400 $ \step -> do
       begun <- getMonotonicTime
-      launching (sleepBetween begun (1 / 0)) $ \_ ->
+      withThread (sleepBetween begun (1 / 0)) $ \_ ->
         replicateM_ 400 $ do
           t <- getMonotonicTime
           sleepBetween t (t + 0.0005) >> step
 
-  -- (Who is interrupted leaves something behind until the gate opens.)
-  prop "nobody waits at a gate that is farther away than he has slept, or than a second" $
+  -- (An interrupted sleep leaves memory in use until its bucket expires.)
+  prop "never wait in a bucket that is further away than they have lasted, or than a second" $
     forAll ((,) <$> choose (0, maxBound `div` 4) <*> oneof [choose (1, 100000), choose (1, maxBound `div` 4)]) $ \(from, long) ->
       let end = from + long
-          gates = takeWhile (< end) (take 100 (iterate (nextBucket from end) from)) ++ [end]
-          far = [gate - t | (t, gate) <- zip gates (drop 1 gates), gate - t > max second (t - from)]
-       in counterexample (show gates) $ far === [] .&&. length gates < 64
+          buckets = takeWhile (< end) (take 100 (iterate (nextBucket from end) from)) ++ [end]
+          far = [bucket - t | (t, bucket) <- zip buckets (drop 1 buckets), bucket - t > max second (t - from)]
+       in counterexample (show buckets) $ far === [] .&&. length buckets < 64
  where
   second = 8000

@@ -22,7 +22,7 @@ import System.Exit (ExitCode (..))
 import System.IO (hFlush, stdout)
 import System.Posix.Process (exitImmediately)
 
--- | Says what is broken, and ends the process, whatever still runs.
+-- | Prints which promise is broken, and ends the process, whatever still runs.
 broken :: String -> IO a
 broken why = do
   putStrLn ("BROKEN  " ++ why)
@@ -30,7 +30,7 @@ broken why = do
   _ <- exitImmediately (ExitFailure 1)
   throwIO (ErrorCall why)
 
--- | How many threads the library started that have not ended.
+-- | The number of threads that the library has started and that have not ended.
 liveThreadCount :: IO Int
 liveThreadCount = peek threads
 
@@ -39,8 +39,8 @@ foreign import ccall "&behavior_lang_threads" threads :: Ptr Int
 promise :: String -> Bool -> IO ()
 promise what kept = unless kept (broken what)
 
--- | How the action ended in a thread of its own, which must be within so many milliseconds.
--- The first function is told the thread.
+-- | Runs the action in a thread of its own, in which it must end within the given number of
+-- milliseconds, and returns how it ended. The first function gets the thread.
 endsWithin :: Int -> String -> (ThreadId -> IO ()) -> IO a -> IO (Either SomeException a)
 endsWithin limit what meanwhile act = do
   box <- newEmptyMVar

@@ -1,4 +1,4 @@
--- | Runs one attack by its name; without a name it says which there are.
+-- | Runs one attack by its name; without a name it prints the names of all.
 module Main (main) where
 
 import System.Environment (getArgs)
@@ -30,7 +30,7 @@ main = do
   case arguments of
     [] -> mapM_ (putStrLn . fst) attacks
     [name] | Just attack <- lookup name (attacks ++ documented) -> attack
-    _ -> die "attacks: the argument is the name of one"
+    _ -> die "attacks: the argument is the name of an attack"
 
 attacks :: [(String, IO ())]
 attacks =
@@ -53,7 +53,7 @@ attacks =
   , ("UndefinedOutside", UndefinedOutside.attack)
   ]
 
--- | Those that hang, as the page of "Behavior" says ("What GHC limits").
+-- | Attacks that hang, as the page of "Behavior" documents ("What GHC limits").
 documented :: [(String, IO ())]
 documented =
   [ ("IndirectThrow", IndirectThrow.attack)

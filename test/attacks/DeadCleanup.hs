@@ -1,5 +1,5 @@
--- | Attacks: a cleanup that waits for what never comes, while its operator waits for it. Must come
--- out: GHC notices, and wakes the cleanup, as it does without the library.
+-- | A cleanup blocks for ever while its operator waits for it. Expected: GHC detects the
+-- deadlock and wakes the cleanup, as it does without the library.
 module DeadCleanup (attack) where
 
 import Control.Concurrent
@@ -14,7 +14,7 @@ attack :: IO ()
 attack =
   forM_ [(way, collecting) | way <- ways, collecting <- [True, False]] $ \((name, operator), collecting) -> do
     woken <- newEmptyMVar
-    -- (Nobody holds on to the caller's thread.)
+    -- (No reference to the caller's thread is kept.)
     _ <- forkIO (operator (dead woken))
     awaiting (200 :: Int) woken collecting (name ++ if collecting then ", with collections" else ", idle")
  where

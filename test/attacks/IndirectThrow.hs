@@ -1,5 +1,5 @@
--- | Attacks: a cleanup that throws to the operator's caller, but from a branch or a thread of its
--- own that it waits for. It hangs, for the caller has been stopped already, or is masked.
+-- | A cleanup throws to the operator's caller from a branch or a thread of its own, and
+-- waits for that. It hangs, since the caller has been stopped already or is masked.
 module IndirectThrow (attack) where
 
 import Control.Concurrent
@@ -49,6 +49,6 @@ ways =
 
 callers :: [(String, IO () -> IO ())]
 callers =
-  [ ("a caller that has been thrown something", id)
+  [ ("a caller that was interrupted before", id)
   , ("a masked caller", mask_)
   ]

@@ -1,5 +1,5 @@
--- | Attacks: the task ends just when the condition becomes true, and the sensor is deaf for 4 s. Must
--- come out: the recovery begins at once, and does not wait until the sensor has been stopped.
+-- | The task ends just when the condition becomes true, and the sensor is uninterruptible
+-- for 4 s. Expected: the recovery begins at once, and does not wait for the sensor to stop.
 module LateRecovery (attack) where
 
 import Control.Concurrent
@@ -15,8 +15,9 @@ import Attack
 import Behavior hiding (monitor)
 import Behavior.Signal (monitor, polling, watching)
 
--- | The moment between the operator's look and its stop request is short. With @-C0@ GHC switches
--- threads wherever it can, so there too; that can be said only as a program begins.
+-- | The time between the operator's read and its stop request is short. With @-C0@ GHC
+-- switches threads wherever it can, so there too; that option is only read when a program
+-- starts.
 attack :: IO ()
 attack = do
   again <- lookupEnv "ATTACK_AGAIN"
@@ -32,29 +33,29 @@ attack = do
   putStrLn (show (length ends) ++ " recoveries, " ++ show late ++ " late")
   promise (show late ++ " of " ++ show (length ends) ++ " recoveries waited for the sensor") (late == 0)
 
--- | Whether the sensor had ended when the recovery began, if it did.
+-- | Whether the sensor had ended when the recovery began, if the recovery began.
 one :: Int -> IO (Maybe Bool)
 one k = do
   low <- newTVarIO False
-  deaf <- newTVarIO False
+  sensorMasked <- newTVarIO False
   isFirst <- newIORef True
-  deafOver <- newIORef False
+  sensorOver <- newIORef False
   begun <- newIORef Nothing
   let reading = do
         first <- atomicModifyIORef' isFirst ((,) False)
-        unless first $ uninterruptibleMask_ (atomically (writeTVar deaf True) >> milliseconds 4000 >> writeIORef deafOver True)
+        unless first $ uninterruptibleMask_ (atomically (writeTVar sensorMasked True) >> milliseconds 4000 >> writeIORef sensorOver True)
       task = do
         over <- readIORef begun
         when (isNothing over) $ do
-          atomically (readTVar deaf >>= check)
+          atomically (readTVar sensorMasked >>= check)
           atomically (readTVar low >>= check)
           mapM_ (const yield) [1 .. k `mod` 10]
           failed
       recovery = do
-        readIORef deafOver >>= writeIORef begun . Just
+        readIORef sensorOver >>= writeIORef begun . Just
         atomically (writeTVar low False)
   _ <- forkIO $ do
-    atomically (readTVar deaf >>= check)
+    atomically (readTVar sensorMasked >>= check)
     threadDelay (1000 + 100 * k)
     atomically (writeTVar low True)
   _ <- try (monitor (const <$> watching (readTVar low) <*> polling 0.0005 reading) recovery task) :: IO (Either SomeException ())

@@ -1,5 +1,5 @@
--- | Attacks: a branch that is just being stopped throws to the operator's caller, on two capabilities at
--- the same moment. Must come out: both arrive, nothing hangs, nothing is left.
+-- | A branch that is just being stopped throws to the operator's caller, on two capabilities
+-- at the same moment. Expected: both are received, nothing hangs, no thread is left.
 module MutualThrow (attack) where
 
 import Control.Concurrent
@@ -20,7 +20,7 @@ attack =
       spun <- newIORef (0 :: Int)
       started <- newEmptyMVar
       let spin n = replicateM_ n (modifyIORef' spun (+ 1))
-          -- It throws without having been stopped, or just then, or in its cleanup.
+          -- It throws before its stop is requested, at the same moment, or in its cleanup.
           throwing =
             (tryPutMVar started () >> yield >> spin (k * 7 `mod` 900) >> throwTo me (Boom k) >> milliseconds 3600000)
               `onException` writeIORef stopped True

@@ -1,5 +1,6 @@
--- | Attacks: three nested System.Timeouts that expire in every order while an operator stops a slow
--- branch, the caller masked or not. Must come out: what GHC does; a masked caller keeps its result.
+-- | Three nested System.Timeouts expire in every order while an operator stops a slow branch,
+-- the caller masked or not. Expected: the outcome in plain GHC; a masked caller keeps its
+-- result.
 module NestedLimits (attack) where
 
 import Control.Concurrent
@@ -20,7 +21,8 @@ attack =
     forM_ operators $ \(name, operator) -> do
       got <- run id limits operator
       promise (name ++ " " ++ show limits ++ ": " ++ got ++ ", and in GHC " ++ expected) (got == expected)
-    -- All expire while it waits, and it was not interrupted before: the result must not be lost.
+    -- All expire while the operator waits, and it was not interrupted before: the result must
+    -- not be lost.
     forM_ masks $ \(name, around) -> do
       kept <- run around limits (\act -> parallel (milliseconds 3600000 `finally` act) (pure ()))
       promise (name ++ " " ++ show limits ++ ": " ++ kept) ("result" `elem` words kept)

@@ -1,7 +1,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
--- | Attacks: children that are stopped, awaited and forked from everywhere, also as all ends. Must
--- come out: nobody waits for ever, nothing is left, many children take constant memory.
+-- | Children are stopped, awaited and forked by any thread, also while their scope ends.
+-- Expected: no thread waits for ever, none is left, many children take constant memory.
 module NurseryRaces (attack) where
 
 import Control.Concurrent
@@ -22,7 +22,7 @@ attack = do
     end <- endsWithin 10000 ("race " ++ show k) (\t -> void (forkIO (threadDelay (k `mod` 300) >> throwTo t (Boom k)))) $
       scoped $ \nursery -> do
         children <- forM [1 .. 5 :: Int] $ \i -> fork nursery (threadDelay (i * 20) `finally` (fork nursery (pure ()) ? failed))
-        -- Each awaits the one before in its cleanup, and stops it.
+        -- The cleanup of each requests the stop of two children, and awaits the first.
         forM_ (zip children (drop 1 children)) $ \(a, b) ->
           fork nursery (milliseconds 3600000 `finally` (requestStop a >> requestStop b >> (atomically (void (await a)) ? pure ())))
         forM_ children requestStop
@@ -31,7 +31,8 @@ attack = do
     n <- liveThreadCount
     promise ("race " ++ show k ++ ": " ++ show n ++ " threads were left") (n == 0)
   putStrLn "races held" >> hFlush stdout
-  -- A child that is stopped has not failed its scope; one that completes all the same has a result.
+  -- A child that is stopped does not make its scope fail; one that nevertheless completes has
+  -- a result.
   replicateM_ 2000 $ do
     r <- inThread 5000 "a stop" $ scoped $ \nursery -> do
       c <- fork nursery (('y' <$ milliseconds 3600000) `catch` \(_ :: SomeAsyncException) -> pure 'x')

@@ -1,5 +1,5 @@
--- | Attacks: a cleanup that throws to the operator's caller, which may be masked where the
--- operator stops the branch itself. Must come out: every operator ends, and none is left.
+-- | A cleanup throws to the operator's caller, which may be masked where the operator stops
+-- the branch itself. Expected: every operator ends, and no thread is left.
 module ReactiveThrow (attack) where
 
 import Control.Concurrent

@@ -1,5 +1,5 @@
--- | Attacks: hysteresis, debounce and staleAfter under withShared, opened by many operators at once
--- and one after the other. Must come out: one memory, dead sensors heard by all, nothing left.
+-- | hysteresis, debounce and staleAfter under withShared, used by many operators at once and
+-- one after the other. Expected: one memory, a dead sensor ends all of them, no thread is left.
 module SharedFilters (attack) where
 
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
@@ -19,7 +19,7 @@ import Behavior.Time (atomically)
 
 attack :: IO ()
 attack = do
-  -- The memory of a shared hysteresis outlives each operator, also where nobody looks.
+  -- The memory of a shared hysteresis outlives each operator, also while no operator reads it.
   replicateM_ 100 $ do
     level <- newTVarIO (50 :: Int)
     ended "hysteresis" $ Signal.withShared (Signal.hysteresis False 20 80 (Signal.watching (readTVar level))) $ \s -> do
@@ -32,11 +32,11 @@ attack = do
       is "fallen" s False
       set level 50
       void (allOf [is "kept by all" s False, is "kept by all" s False])
-      -- Nobody looks now, but the worker.
+      -- Now only the worker reads it.
       set level 85 >> sleep 0.05 >> set level 50
-      is "seen by nobody but the worker" s True
+      is "read only by the worker" s True
   putStrLn "hysteresis held"
-  -- A sensor that dies, hangs or comes back: heard by all, each time.
+  -- A sensor that throws, hangs or recovers: each time it affects all operators.
   replicateM_ 50 $ do
     count <- newIORef (0 :: Int)
     let reading = atomicModifyIORef' count (\n -> (n + 1, n)) >>= \n -> if n >= 5 then throwIO (Boom n) else pure (n >= 0)
@@ -53,7 +53,7 @@ attack = do
       writeIORef hung 0
       Signal.withShared (Signal.polling 0.001 hangs) $ \s -> Signal.whileHolding (Signal.staleAfter 0.005 (Signal.debounce 0.001 s)) (sleep 3600)
   putStrLn "dead and stale sensors held"
-  -- A debounce that is shared settles, whoever looks; and a flicker does not get through.
+  -- A shared debounce settles, whichever operator reads it; and a flicker is suppressed.
   replicateM_ 30 $ do
     flag <- newTVarIO False
     ended "debounce" $ Signal.withShared (Signal.debounce 0.02 (Signal.watching (readTVar flag))) $ \s -> do

@@ -1,7 +1,7 @@
 {-# LANGUAGE BangPatterns #-}
 
--- | Attacks: simulated runs that end in a deadlock, while another thread computes and does not allocate.
--- Must come out: each is reported as the deadlock that it is, and not as a wait outside of the simulation.
+-- | Simulated runs end in a deadlock, while another thread computes and does not allocate.
+-- Expected: each is reported as a deadlock, and not as blocked outside of the simulation.
 module SimBusy (attack) where
 
 import Control.Concurrent
@@ -27,7 +27,7 @@ attack = do
         isOver <- readIORef over
         unless isOver computing
   done <- newEmptyMVar
-  -- On one capability: where there is another, the watchdog is there.
+  -- All on one capability: if there is another, the watchdog runs on that one.
   void . forkOn 0 $ do
     void (forkOn 0 computing)
     forM_ [1 .. 3 :: Int] $ \k -> do

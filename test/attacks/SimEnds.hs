@@ -1,7 +1,8 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
--- | Attacks: the simulator. 100,000 runs with pending exceptions, and runs that are interrupted at
--- random moments. Must come out: same seed, same run; no thread, no memory, no hang is left.
+-- | The simulator: 100,000 runs with pending exceptions, and runs that are interrupted at
+-- random moments. Expected: the same seed gives the same run; nothing hangs, and no thread
+-- and no memory is left.
 module SimEnds (attack) where
 
 import Control.Exception

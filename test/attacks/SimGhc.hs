@@ -1,7 +1,8 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
--- | Attacks: what the simulator says of masks and several stops. Must come out: what many real runs of
--- the same program show is among what its schedules show; what GHC fixes is one and the same.
+-- | The simulator's results for masks and several stops. Expected: the outcomes of many real
+-- runs of a program are among the outcomes of its schedules; where GHC fixes the outcome, both
+-- sets are equal.
 module SimGhc (attack) where
 
 import Control.Concurrent.STM (check, newTVarIO, readTVar, readTVarIO, writeTVar)
@@ -31,47 +32,47 @@ attack = forM_ programs $ \(name, fixed, program) -> do
     Cancelled e -> Left e
     other -> Right (explain other)
 
--- | Each with whether GHC fixes what comes out.
+-- | Each with whether GHC fixes the outcome.
 programs :: [(String, Bool, IO String)]
 programs =
-  [ ("a stop at the unmask", False, logged $ \say -> do
+  [ ("a stop at the unmask", False, logged $ \write -> do
       gate <- newTVarIO False
       parallel
-        (mask_ (atomically (writeTVar gate True) >> say "m") >> say "never")
+        (mask_ (atomically (writeTVar gate True) >> write "m") >> write "never")
         (atomically (readTVar gate >>= check))
     )
-  , ("a stop in a masked wait that is there", False, logged $ \say -> do
+  , ("a stop in a masked wait that is there", False, logged $ \write -> do
       v <- newTVarIO False
       parallel
-        (mask_ ((atomically (readTVar v >>= check) >> say "got") `catch` \e -> say "stop" >> throwIO (e :: SomeException)))
+        (mask_ ((atomically (readTVar v >>= check) >> write "got") `catch` \e -> write "stop" >> throwIO (e :: SomeException)))
         (atomically (writeTVar v True)))
-  , ("a child that is stopped before it starts", False, logged $ \say ->
+  , ("a child that is stopped before it starts", False, logged $ \write ->
       scoped $ \n -> do
-        c <- fork n (say "began" >> sleep 100)
+        c <- fork n (write "began" >> sleep 100)
         requestStop c
         atomically (tryAwait c >>= maybe (check False) (const (pure ())))
-        say "over")
-  , ("a child that completes all the same", True, logged $ \say ->
+        write "over")
+  , ("a child that nevertheless completes", True, logged $ \write ->
       scoped $ \n -> do
         started <- newTVarIO False
         c <- fork n (mask_ (atomically (writeTVar started True) >> (sleep 100 `catch` \(_ :: SomeException) -> pure ()) >> pure "done"))
         atomically (readTVar started >>= check)
         requestStop c
-        atomically (await c) >>= say)
-  , ("two stops: of the timeout, and of the operator", False, logged $ \say -> do
-      r <- firstOf [(timeout 0.002 (hangs say) >> pure "?") ? pure "timed out", sleep 0.002 >> pure "second"]
-      say r)
-  , ("a cleanup that fails, and one that faults", True, logged $ \say -> do
+        atomically (await c) >>= write)
+  , ("two stops: of the timeout, and of the operator", False, logged $ \write -> do
+      r <- firstOf [(timeout 0.002 (hangs write) >> pure "?") ? pure "timed out", sleep 0.002 >> pure "second"]
+      write r)
+  , ("a cleanup that fails, and one that faults", True, logged $ \write -> do
       started <- newTVarIO (0 :: Int)
       let inside = atomically (readTVar started >>= writeTVar started . (+ 1)) >> sleep 100
       parallel (atomically (readTVar started >>= check . (== 2))) (both (inside `finally` failed) (inside `finally` throwIO (Boom 1)))
-      say "?")
+      write "?")
   ]
  where
-  hangs say = sleep 100 `finally` say "c"
+  hangs write = sleep 100 `finally` write "c"
   logged body = do
     book <- newTVarIO []
-    let say w = atomically (readTVar book >>= writeTVar book . (w :))
-    end <- try (body say)
+    let write w = atomically (readTVar book >>= writeTVar book . (w :))
+    end <- try (body write)
     ws <- reverse <$> readTVarIO book
     pure (unwords ws ++ either (\e -> " threw " ++ show (e :: SomeException)) (const "") end)

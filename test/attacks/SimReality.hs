@@ -1,7 +1,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
--- | Attacks: what the simulator says of reactive operators, of children and of faults. Must come out:
--- what many real runs of the same program show is among what its schedules show.
+-- | The simulator's results for reactive operators, for children and for faults. Expected: the
+-- outcomes of many real runs of a program are among the outcomes of its schedules.
 module SimReality (attack) where
 
 import Control.Exception
@@ -32,46 +32,46 @@ attack = forM_ programs $ \(name, program) -> do
 
 programs :: [(String, IO String)]
 programs =
-  [ ("watched monitor and a failing task", logged $ \say -> do
+  [ ("watched monitor and a failing task", logged $ \write -> do
       low <- newTVarIO False
       parallel
-        (Signal.monitor (Signal.watching (readTVar low)) (say "r" >> atomically (writeTVar low False)) ((atomically (readTVar low >>= check) >> failed) `finally` say "t"))
+        (Signal.monitor (Signal.watching (readTVar low)) (write "r" >> atomically (writeTVar low False)) ((atomically (readTVar low >>= check) >> failed) `finally` write "t"))
         (atomically (writeTVar low True) >> atomically (readTVar low >>= check . not)))
-  , ("whileHolding, masked caller, two flags", logged $ \say -> do
+  , ("whileHolding, masked caller, two flags", logged $ \write -> do
       f <- newTVarIO True
       g <- newTVarIO False
-      void (firstOf [ mask_ (Signal.whileHolding (Signal.watching (readTVar f)) ((atomically (readTVar g >>= check) >> say "w") `finally` say "c")) ? say "lost"
-              , atomically (writeTVar f False) >> atomically (writeTVar g True) >> say "x" ]))
-  , ("fork, stop, await by two", logged $ \say -> scoped $ \n -> do
+      void (firstOf [ mask_ (Signal.whileHolding (Signal.watching (readTVar f)) ((atomically (readTVar g >>= check) >> write "w") `finally` write "c")) ? write "lost"
+              , atomically (writeTVar f False) >> atomically (writeTVar g True) >> write "x" ]))
+  , ("fork, stop, await by two", logged $ \write -> scoped $ \n -> do
       v <- newTVarIO False
-      c <- fork n (mask_ (atomically (readTVar v >>= check) `catch` \(e :: SomeException) -> say "s" >> throwIO e) >> say "d")
-      d <- fork n (requestStop c >> (atomically (await c) ? say "stopped"))
+      c <- fork n (mask_ (atomically (readTVar v >>= check) `catch` \(e :: SomeException) -> write "s" >> throwIO e) >> write "d")
+      d <- fork n (requestStop c >> (atomically (await c) ? write "stopped"))
       atomically (writeTVar v True)
       atomically (await d))
-  , ("withShared, closed by its end", logged $ \say -> do
+  , ("withShared, closed by its end", logged $ \write -> do
       v <- newTVarIO (0 :: Int)
       Signal.withShared (Signal.watching (readTVar v)) $ \s ->
-        parallel (Signal.switch s (\k -> say (show k) >> if k == 2 then pure () else atomically (readTVar v >>= check . (/= k)) >> say "b"))
-          (atomically (writeTVar v 1) >> atomically (writeTVar v 2) >> say "w"))
-  , ("a fault while stopped by both sides", logged $ \say -> do
+        parallel (Signal.switch s (\k -> write (show k) >> if k == 2 then pure () else atomically (readTVar v >>= check . (/= k)) >> write "b"))
+          (atomically (writeTVar v 1) >> atomically (writeTVar v 2) >> write "w"))
+  , ("a fault while stopped by both sides", logged $ \write -> do
       g <- newTVarIO False
-      both (both (atomically (readTVar g >>= check) >> failed) (atomically (readTVar g >>= check) `finally` say "f"))
-           ((atomically (writeTVar g True) >> throwIO (Boom 3)) `finally` say "h"))
-  , ("teleo rules flip", logged $ \say -> do
+      both (both (atomically (readTVar g >>= check) >> failed) (atomically (readTVar g >>= check) `finally` write "f"))
+           ((atomically (writeTVar g True) >> throwIO (Boom 3)) `finally` write "h"))
+  , ("teleo rules flip", logged $ \write -> do
       v <- newTVarIO (0 :: Int)
       parallel
-        (Signal.teleoReactive [((== 1) <$> Signal.watching (readTVar v), say "one" `finally` say "1"), (pure True, (atomically (readTVar v >>= check . (== 3)) >> say "three") `finally` say "z")])
+        (Signal.teleoReactive [((== 1) <$> Signal.watching (readTVar v), write "one" `finally` write "1"), (pure True, (atomically (readTVar v >>= check . (== 3)) >> write "three") `finally` write "z")])
         (forM_ [1, 2, 3] (atomically . writeTVar v) >> atomically (check False)))
-  , ("hysteresis flips", logged $ \say -> do
+  , ("hysteresis flips", logged $ \write -> do
       v <- newTVarIO (0 :: Int)
       Signal.withShared (Signal.hysteresis False 2 5 (Signal.watching (readTVar v))) $ \s ->
-        parallel (Signal.waitUntil s >> say "up" >> Signal.waitUntil (not <$> s) >> say "down")
-          (forM_ [6, 3, 1] (\k -> atomically (writeTVar v k) >> say (show k)) >> say "end"))
+        parallel (Signal.waitUntil s >> write "up" >> Signal.waitUntil (not <$> s) >> write "down")
+          (forM_ [6, 3, 1] (\k -> atomically (writeTVar v k) >> write (show k)) >> write "end"))
   ]
  where
   logged body = do
     book <- newTVarIO []
-    let say w = atomically (readTVar book >>= writeTVar book . (w :))
-    end <- try (body say)
+    let write w = atomically (readTVar book >>= writeTVar book . (w :))
+    end <- try (body write)
     ws <- reverse <$> readTVarIO book
     pure (unwords ws ++ either (\e -> " threw " ++ show (e :: SomeException)) (const "") end)

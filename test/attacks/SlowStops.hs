@@ -1,7 +1,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
--- | Attacks: many operators at once that wait for slow cleanups, and deep nests of them. Must come
--- out: no processor time while they wait (promise 10), no memory and no thread after.
+-- | Many operators at once wait for slow cleanups, side by side and deeply nested. Expected: no
+-- processor time while they wait (promise 10), and no memory and no thread is left.
 module SlowStops (attack) where
 
 import Control.Concurrent
@@ -37,7 +37,7 @@ attack = do
     void (forkIO (killThread t))
     milliseconds 1000
     pure (takeMVar done)
-  -- And many after one another.
+  -- And many, one after the other.
   let slowStop = mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (threadDelay 50)) (pure ()))
   replicateM_ 2000 slowStop
   before <- resident

@@ -1,8 +1,8 @@
 {-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
--- | Attacks: the stop request of a single branch, which the operator makes itself, while three
--- exceptions hit its caller, bound or not. Must come out: each branch is stopped once, never twice.
+-- | The operator itself makes the stop request of a single branch, while three exceptions are
+-- thrown to its caller, bound or not. Expected: each branch is stopped once, never twice.
 module StopsOnce (attack) where
 
 import Control.Concurrent
@@ -26,7 +26,7 @@ attack =
       stops <- newIORef (0 :: Int)
       over <- newEmptyMVar
       let what = name ++ ", round " ++ show k
-          -- Deaf for a moment, then stopped; its cleanup can be interrupted.
+          -- Uninterruptible for a moment, then stopped; its cleanup can be interrupted.
           slow = mask $ \restore -> do
             uninterruptibleMask_ (putMVar entered () >> threadDelay (k `mod` 7 * 20))
             end <- try (restore (milliseconds 3600000)) :: IO (Either SomeException ())

@@ -1,5 +1,5 @@
--- | Attacks: random trees of operators, whose caller is thrown several exceptions at random moments,
--- and whose cleanups fault. Must come out: an end, nothing left, no fault or cancellation lost.
+-- | Random trees of operators: several exceptions are thrown to the caller at random moments,
+-- and cleanups fault. Expected: each ends, nothing is left, no fault or cancellation is lost.
 module Storm (attack) where
 
 import Control.Concurrent
@@ -57,17 +57,17 @@ attack = do
     behavior <- below 4 >>= tree
     waits <- mapM (\_ -> below 800) [1 .. 3 :: Int]
     inner <- below 900
-    heard <- newIORef (0 :: Int)
+    finished <- newIORef (0 :: Int)
     end <- endsWithin 20000 ("storm " ++ show k) (\t ->
       forM_ (zip [1 ..] waits) $ \(i, w) -> forkIO (threadDelay w >> throwTo t (if even (k + i) then toException (Boom (-i)) else toException ThreadKilled))) $ do
         r <- try (timeout inner behavior) :: IO (Either SomeException (Maybe ()))
         uninterruptibleMask_ $ do
           n <- readIORef inside
-          when (n /= 0) (void (broken ("storm " ++ show k ++ ": " ++ show n ++ " behaviours run on")))
+          when (n /= 0) (void (broken ("storm " ++ show k ++ ": " ++ show n ++ " behaviours still run")))
           f <- readIORef faulted
-          -- (A second fault may hide behind the first.)
+          -- (A second fault may be hidden by the first.)
           when (f > 0 && not (faultIn k r)) (void (broken ("storm " ++ show k ++ ": a fault was lost: " ++ show r)))
-        writeIORef heard 1
+        writeIORef finished 1
     end `seq` pure ()
     left <- liveThreadCount
     promise ("storm " ++ show k ++ ": " ++ show left ++ " threads were left") (left == 0)

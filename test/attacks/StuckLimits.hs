@@ -1,5 +1,5 @@
--- | Attacks: the window of Deadlock.hs. Two nested System.Timeouts expire while a cleanup stops a
--- slow thread by throwTo. Must come out: what GHC does without the library; no Timeout escapes.
+-- | Two nested System.Timeouts expire while a cleanup stops a slow thread by throwTo. Expected:
+-- the outcome in GHC without the library; no Timeout escapes.
 module StuckLimits (attack) where
 
 import Control.Concurrent
@@ -17,7 +17,7 @@ attack =
     ghc <- run outer inner id
     promise ("outer " ++ show outer ++ ", inner " ++ show inner ++ ": " ++ library ++ ", and in GHC " ++ ghc) (library == ghc)
 
--- | The cleanup takes 300 ms: it kills a thread that is slow to hear.
+-- | The cleanup takes 300 ms: it kills a thread that is uninterruptible for so long.
 run :: Int -> Int -> (IO () -> IO ()) -> IO String
 run outer inner operator = do
   end <- inThread 5000 "two limits" $ do
@@ -30,7 +30,7 @@ run outer inner operator = do
   pure (either (\e -> "escaped: " ++ show e) id end)
  where
   slow = do
-    deaf <- newEmptyMVar
-    other <- mask_ . forkIO $ uninterruptibleMask_ (putMVar deaf () >> milliseconds 300)
-    takeMVar deaf
+    masked <- newEmptyMVar
+    other <- mask_ . forkIO $ uninterruptibleMask_ (putMVar masked () >> milliseconds 300)
+    takeMVar masked
     killThread other

@@ -1,5 +1,5 @@
--- | Attacks: a limit around a masked operator expires while a cleanup stops a slow thread by throwTo.
--- Must come out: the result or Nothing, as in GHC; no Timeout reaches what comes after the limit.
+-- | A limit around a masked operator expires while a cleanup stops a slow thread by throwTo.
+-- Expected: the result or Nothing, as in GHC; no Timeout is received after the limit has ended.
 module StuckMasked (attack) where
 
 import Control.Concurrent
@@ -23,7 +23,7 @@ attack = forM_ [1 .. 60 :: Int] $ \k -> do
     _ <- timeout limit (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ slow) (pure ())))
     milliseconds 20
   slow = do
-    deaf <- newEmptyMVar
-    other <- mask_ . forkIO $ uninterruptibleMask_ (putMVar deaf () >> milliseconds 70)
-    takeMVar deaf
+    masked <- newEmptyMVar
+    other <- mask_ . forkIO $ uninterruptibleMask_ (putMVar masked () >> milliseconds 70)
+    takeMVar masked
     killThread other

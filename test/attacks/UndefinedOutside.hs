@@ -1,5 +1,5 @@
--- | Attacks: an exception from outside that is itself undefined, while a cleanup faults. Must come
--- out: the fault gets out, in an asynchronous exception.
+-- | An exception that is itself undefined is thrown from outside, while a cleanup faults.
+-- Expected: the fault is thrown, inside an asynchronous exception.
 module UndefinedOutside (attack) where
 
 import Control.Concurrent

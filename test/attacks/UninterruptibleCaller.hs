@@ -1,5 +1,5 @@
--- | Attacks: a cleanup that throws to the operator's caller, which is masked
--- uninterruptibly. It hangs, as in GHC.
+-- | A cleanup throws to the operator's caller, which is masked uninterruptibly. It hangs, as
+-- in GHC.
 module UninterruptibleCaller (attack) where
 
 import Control.Concurrent

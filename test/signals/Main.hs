@@ -1,17 +1,17 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Sends programs that call 'runBehavior' again and again a signal, each at a random
--- moment of its life, and checks how it ended.
+-- Runs programs that call 'runBehavior' repeatedly, sends each of them a signal at a
+-- random moment, and checks how it ended.
 --
 -- > signals 1000
 --
--- (Without a number: 20.)
+-- (The default is 20.)
 --
--- Each moment is a process of its own, which is waited for. It must end with 130 after a
--- SIGINT and with 143 after a SIGTERM (as a shell shows that: a process that a signal has
--- ended has the status 128 + the number of the signal), and each action that had begun
--- must have run its cleanup.
+-- Each moment has a process of its own, and its end is awaited. The process must end with
+-- 130 after a SIGINT and with 143 after a SIGTERM (as a shell shows it: a process that was
+-- ended by a signal has the status 128 + the number of the signal), and each action that
+-- had begun must have run its cleanup.
 module Main (main) where
 
 import Control.Concurrent (forkIO, newEmptyMVar, putMVar, takeMVar, threadDelay)
@@ -39,9 +39,9 @@ main = do
     ["child", name] | Just act <- lookup name programs -> mark 'r' >> forever (runBehavior act)
     [] -> attack 20
     [moments] | [(n, "")] <- reads moments, n > 0 -> attack n
-    _ -> die "signals: the argument is the number of moments for each program, signal and runtime, 1000 say"
+    _ -> die "signals: the argument is the number of moments for each program, signal and runtime, for example 1000"
 
--- | What the children run again and again.
+-- | The programs that the children run repeatedly.
 programs :: [(String, Behavior ())]
 programs =
   [ ("sleep", sleep 0.0005)
@@ -49,7 +49,7 @@ programs =
   , ("cleanup", bracket_ (mark 'b') (mark 'e') (sleep 0.0005))
   ]
 
--- | Writes a mark to standard output, at once.
+-- | Writes a mark to standard output, without a buffer.
 mark :: Char -> IO ()
 mark c = void (fdWrite stdOutput [c])
 
@@ -79,11 +79,12 @@ data End
     WrongStatus Int
   | -- | How many actions had begun, and how many cleanups had run.
     NoCleanup Int Int
-  | -- | It went on for twenty seconds.
+  | -- | It still ran after twenty seconds.
     WithoutEffect
   deriving (Eq, Ord, Show)
 
--- | One child, which gets the signal so many nanoseconds after it has begun.
+-- | Runs one child and sends it the signal the given number of nanoseconds after it has
+-- begun.
 moment :: String -> Int -> Signal -> Word64 -> IO End
 moment name capabilities signal delay = do
   self <- getExecutablePath
@@ -117,7 +118,7 @@ moment name capabilities signal delay = do
   pause since = do
     t <- getMonotonicTimeNSec
     let left = since + delay - min (since + delay) t
-    -- The last of it without a system call, which would come too late.
+    -- The last 0.2 ms are spent without a system call, which would return too late.
     if left > 200000 then threadDelay 50 >> pause since else unless (left == 0) (pause since)
   begun = length . filter (== 'b')
   ended = length . filter (== 'e')
