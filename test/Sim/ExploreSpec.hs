@@ -145,7 +145,7 @@ counterexample = do
     [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
   it "distinguishes the branches of two operators" $ do
     run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
-    lines (renderSteps (mentioning ["starts", "asks"] (steps run)))
+    lines (renderSteps (mentioning ["starts", "requests"] (steps run)))
       `shouldBe` [ "     0.000 s  1 both: left              starts"
                  , "     0.000 s  2 both: right             starts"
                  , "     0.000 s  3 parallel: left (of 1)   starts"
