@@ -15,7 +15,7 @@ import Control.Monad (void)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
-import Behavior.Parallel (allOf, await, firstOf, fork, scoped)
+import Behavior.Parallel (allOf, await, firstOf, fork, pinned, scoped, unpinned)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically, timeout)
 import Support
@@ -59,6 +59,8 @@ places =
   , inThread "scoped" "body" (\act -> scoped (const act))
   , inThread "scoped" "fork" $ \act ->
       scoped (\nursery -> fork nursery act >>= atomically . await)
+  , inThread "pinned" "body" pinned
+  , inThread "unpinned" "body" unpinned
   , inThread "timeout" "branch" (timeout 3600)
   , inThread "rSelect" "left" (\act -> Signal.rSelect (pure True) act hang)
   , inThread "rSelect" "right" (\act -> rSelect (pure False) hang act)

@@ -11,6 +11,7 @@ import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
 import qualified Behavior.ParallelSpec
+import qualified Behavior.PinnedSpec
 import qualified Behavior.PolledSpec
 import qualified Behavior.PollingSpec
 import qualified Behavior.PromisesSpec
@@ -52,6 +53,7 @@ main = hspec $ do
   describe "Failure" Behavior.FailureSpec.spec
   describe "Parallel" $ do
     Behavior.ParallelSpec.spec
+    Behavior.PinnedSpec.spec
     describe "scoped and fork" Behavior.ScopedSpec.spec
   describe "Signal" $ do
     Behavior.SignalSpec.spec

@@ -15,6 +15,8 @@
 -- 'fork' starts a behaviour and gives a 'Child': you can 'await' its result, read it without
 -- blocking ('tryAwait'), and request its stop ('requestStop').
 --
+-- 'pinned' and 'unpinned' say which processor threads run on.
+--
 -- In all cases, what these operators start has ended, cleanup included, when they return
 -- or throw.
 module Behavior.Parallel
@@ -32,6 +34,10 @@ module Behavior.Parallel
   , fork
   , Nursery
 
+    -- * Which processor they run on
+  , pinned
+  , unpinned
+
     -- * The forked behaviour
   , Child
   , await
@@ -42,3 +48,4 @@ module Behavior.Parallel
 
 import Behavior.Internal.Nursery
 import Behavior.Internal.Parallel
+import Behavior.Internal.Pinned

@@ -19,8 +19,8 @@ import Behavior.Internal.Scope
 
 -- | Runs a behaviour as a whole program; to be called by @main@.
 --
--- * It runs in an unbound thread. In the thread of @main@, which is bound, each
---   thread switch would be a system call.
+-- * It runs in an unbound thread. In the thread of @main@, which is bound, operators take ten
+--   times as long: each thread switch would be a system call.
 -- * The first SIGINT (Ctrl-C) or SIGTERM cancels the behaviour. When that has
 --   ended, cleanup included, the process ends with 130 or 143. A second signal ends
 --   it at once.

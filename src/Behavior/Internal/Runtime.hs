@@ -6,8 +6,9 @@
 -- |
 -- The seam: everything that the library does with threads, time and blocking goes through
 -- this module. No other module (except the timers that it sleeps by,
--- "Behavior.Internal.Runtime.TimerWheel") forks, delays, throws to a thread or blocks in a
--- transaction. So a simulation that replaces the operations of this module replaces all of them.
+-- "Behavior.Internal.Runtime.TimerWheel", and the simulator) forks, delays, throws to a thread or
+-- blocks in a transaction. So a simulation that replaces the operations of this module replaces all
+-- of them.
 --
 -- Each operation is dispatched to one of two backends: the real one, or the simulation that
 -- the calling thread is part of ("Behavior.Internal.Runtime.Dispatch").
@@ -23,6 +24,7 @@ module Behavior.Internal.Runtime
   , tryReadEnd
   , start
   , startWith
+  , Placement (..)
   , interrupt
   , throwToOne
   , throwToAll
@@ -51,8 +53,16 @@ module Behavior.Internal.Runtime
   , withSink
   ) where
 
-import Control.Concurrent (ThreadId, forkIO, myThreadId, throwTo, yield)
-import Control.Concurrent.Async (Async, asyncThreadId, asyncWithUnmask)
+import Control.Concurrent
+  ( ThreadId
+  , forkIO
+  , getNumCapabilities
+  , myThreadId
+  , threadCapability
+  , throwTo
+  , yield
+  )
+import Control.Concurrent.Async (Async, asyncOnWithUnmask, asyncThreadId, asyncWithUnmask)
 import Control.Concurrent.STM (STM, TVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
@@ -112,29 +122,47 @@ tryReadEnd = STM.readTVarIO . threadResult
 -- masking state, and which publishes how that ended. Call it masked, or the thread may be
 -- lost before it is returned.
 start :: Label -> IO a -> IO (Thread (Either SomeException a))
-start = startWith pure (\_ -> pure ())
+start = startWith Inherited pure (\_ -> pure ())
 {-# INLINE start #-}
 
 -- | Like 'start', but the thread publishes the result of the first function, which it applies,
 -- masked, to how the action ended. The second function is part of the transaction that
--- publishes.
+-- publishes. (In a simulation the placement has no effect.)
 --
 -- (The inlining here is chosen so that the dispatch costs nothing.)
-startWith :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
-startWith finish hook label act = inSimulation (startReally finish hook label act) (startSimulated finish hook label act)
+startWith :: Placement -> (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
+startWith placement finish hook label act = inSimulation (startReally placement finish hook label act) (startSimulated finish hook label act)
 {-# INLINE startWith #-}
 
-startReally :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
-startReally finish hook label act = do
+startReally :: Placement -> (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
+startReally placement finish hook label act = do
   result <- STM.newTVarIO Nothing
   add threads 1
   -- The thread is masked, as the caller is: an exception is raised neither before 'try' is in
   -- place, nor between the end of the action and the publication of its outcome.
-  thread <- asyncWithUnmask $ \unmask -> do
+  thread <- asyncPlaced placement $ \unmask -> do
     end <- runThread emit label (unmask act) >>= finish
     STM.atomically (STM.writeTVar result (Just end) >> hook end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
+
+-- | On which of GHC's capabilities a thread runs.
+data Placement
+  = -- | Like the thread that starts it: if that is pinned, on the same capability; otherwise
+    -- wherever GHC moves it.
+    Inherited
+  | -- | Always on the capability on which the thread runs that starts it.
+    Pinned
+  | -- | Wherever GHC moves it.
+    Unpinned
+  deriving (Eq)
+
+-- | 'asyncWithUnmask' for a thread with that placement.
+asyncPlaced :: Placement -> ((forall b. IO b -> IO b) -> IO a) -> IO (Async a)
+asyncPlaced placement act = do
+  (capability, pinned) <- threadCapability =<< myThreadId
+  let here = placement == Pinned || placement == Inherited && pinned
+  if here then asyncOnWithUnmask capability act else asyncWithUnmask act
 
 startSimulated :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread r)
 startSimulated finish hook label act simulation = do
@@ -242,12 +270,16 @@ atomically transaction = inSimulation (STM.atomically transaction) simulated
 -- | Tries to read, yields, tries again, then blocks. Most branches have ended after one yield,
 -- and to block in a transaction costs more than to yield.
 --
+-- With several capabilities it does not yield: GHC would move one of the threads that can then run
+-- to another capability, and they would wake each other from there, which takes much longer.
+--
 -- What the first action reads must be what the second would have given at some moment
 -- meanwhile: it should read one variable only. (In a simulation only the second is run.)
 tryReadThenBlock :: IO (Maybe a) -> IO a -> IO a
 tryReadThenBlock tryRead block = inSimulation tryTwice (const (pure Nothing)) >>= maybe block pure
  where
-  tryTwice = tryRead >>= maybe (yield >> tryRead) (pure . Just)
+  tryTwice = tryRead >>= maybe tryAgain (pure . Just)
+  tryAgain = getNumCapabilities >>= \n -> if n == 1 then yield >> tryRead else pure Nothing
 
 -- | Waits uninterruptibly. It waits again when GHC takes the thread for deadlocked: GHC does
 -- that also while the cleanup that the thread waits for handles the same exception.

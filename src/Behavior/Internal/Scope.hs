@@ -31,6 +31,7 @@ module Behavior.Internal.Scope
   , awaitOutcome
   , SomeBranch (..)
   , branch
+  , branchPlaced
   , branchWithHook
   , worker
   , forget
@@ -172,16 +173,20 @@ stopAll (Scope branches) state before = do
 
 -- | Starts a branch.
 branch :: Scope -> Label -> IO a -> IO (Branch a)
-branch = branchWithHook (\_ -> pure ())
+branch = branchPlaced Inherited
+
+-- | Like 'branch', on the capability that the placement says.
+branchPlaced :: Placement -> Scope -> Label -> IO a -> IO (Branch a)
+branchPlaced placement scope label act = launch scope (\_ -> startWith placement classify (\_ -> pure ()) label act)
 
 -- | Like 'branch'; the given transaction is part of the one that publishes how the branch ended.
 branchWithHook :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
-branchWithHook hook scope label act = launch scope (\_ -> startWith classify hook label act)
+branchWithHook hook scope label act = launch scope (\_ -> startWith Inherited classify hook label act)
 
 -- | Starts a branch that can read whether its stop was requested. A branch that runs a user's
 -- action in a loop must read it: the action may have swallowed the request.
 worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-worker scope label act = launch scope (startWith classify (\_ -> pure ()) label . act)
+worker scope label act = launch scope (startWith Inherited classify (\_ -> pure ()) label . act)
 
 launch :: Scope -> (IO Bool -> IO (Thread (Outcome a))) -> IO (Branch a)
 launch (Scope branches) startThread = mask_ $ do
