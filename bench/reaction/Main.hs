@@ -3,13 +3,12 @@
 -- |
 -- How long it takes from the change of a condition to the first step of the recovery and, to
 -- compare, to the first step of a thread that waits only for that change: while nothing else
--- runs, while other agents wait, or while another thread computes endlessly. Prints a line for
--- each figure, in microseconds.
+-- runs, while other agents wait, or while another thread computes endlessly; with changes every
+-- 0.3 ms (hot), 2 ms (cold) or 5 ms (colder). Prints a line for each figure, in microseconds.
 module Main (main) where
 
 import Control.Concurrent
-  ( MVar
-  , forkIO
+  ( forkIO
   , forkOn
   , getNumCapabilities
   , killThread
@@ -20,42 +19,31 @@ import Control.Concurrent
   , takeMVar
   , threadCapability
   )
-import Control.Concurrent.STM (TVar, check, newTVarIO, readTVar, writeTVar)
+import Control.Concurrent.STM (check, readTVar)
 import qualified Control.Concurrent.STM as STM
-import Control.Exception (evaluate, finally)
+import Control.Exception (finally)
 import Control.Monad (forever, replicateM_, when)
-import Data.Foldable (for_)
-import Data.IORef (IORef, newIORef, readIORef, writeIORef)
-import Data.List (sort)
-import Foreign.C.Types (CInt (..), CUInt (..))
+import Data.List (find)
 import System.Environment (getArgs)
 import System.Exit (die)
 import Text.Read (readMaybe)
 
 import Agent
-import Behavior
-import qualified Behavior.Signal as Signal
+import Computation
 import Measured
-
--- | What a reaction uses.
-data Stage = Stage
-  { flag :: TVar Bool
-  -- ^ The condition.
-  , ready :: MVar ()
-  -- ^ Filled when the next change may be made.
-  , reactedAt :: IORef Double
-  -- ^ When the latest reaction took its first step.
-  }
+import Reaction
 
 main :: IO ()
 main =
   runInUnboundThread $
     getArgs >>= \case
-      variant : others
-        | Just reacts <- lookup variant reactors -> startLoad others >>= measured variant reacts
+      variant : word : load
+        | Just reacts <- lookup variant reactors
+        , Just gap <- find ((== word) . gapName) gaps ->
+            startLoad load >>= measured variant reacts gap
       _ -> usage
  where
-  reactors = [("ours", ours), ("by hand", byHand), ("bare", bare)]
+  reactors = [("ours", reactor), ("by hand", byHand), ("bare", bare)]
 
 -- | Starts the load, and gives its part of the figures' names.
 startLoad :: [String] -> IO String
@@ -74,13 +62,7 @@ startLoad = \case
   computations = [("busy", searching), ("counting", counting)]
 
 usage :: IO a
-usage = die "usage: reaction (ours | \"by hand\" | bare) [AGENTS | busy | counting]"
-
--- | Interrupts a sleeping task.
-ours :: Stage -> IO ()
-ours stage = Signal.monitor (Signal.watching (readTVar (flag stage))) (reaction stage) task
- where
-  task = putMVar (ready stage) () >> sleep 3600
+usage = die "usage: reaction (ours | \"by hand\" | bare) (hot | cold | colder) [AGENTS | busy | counting]"
 
 -- | Exactly the same steps by hand: a thread waits for the change, stops the task, waits for its
 -- end, and starts another thread for the recovery.
@@ -102,44 +84,17 @@ bare stage = forever $ do
   STM.atomically (readTVar (flag stage) >>= check)
   reaction stage
 
--- | Stores the time first.
-reaction :: Stage -> IO ()
-reaction stage = do
-  time >>= writeIORef (reactedAt stage)
-  STM.atomically (writeTVar (flag stage) False)
-
--- | Changes the condition repeatedly, each time after a short pause.
-measured :: String -> (Stage -> IO ()) -> String -> IO ()
-measured variant reacts load = do
-  stage <- Stage <$> newTVarIO False <*> newEmptyMVar <*> newIORef 0
+-- | Changes the condition repeatedly. (With the longer gaps, there are too few changes for the
+-- last quantile.)
+measured :: String -> (Stage -> IO ()) -> Gap -> String -> IO ()
+measured variant reacts gap load = do
+  stage <- newStage
   _ <- forkIO (reacts stage)
-  takeMVar (ready stage)
-  let sample = do
-        _ <- usleep 300
-        changed <- time
-        STM.atomically (writeTVar (flag stage) True)
-        takeMVar (ready stage)
-        reacted <- readIORef (reactedAt stage)
-        pure ((reacted - changed) / 1000)
-  _ <- during 0.2 sample
-  sorted <- sort <$> during 3 sample
-  for_ [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999)] $ \(name, part) ->
-    line (unwords ["reaction", load, name, variant]) (quantile part sorted)
-
--- | Repeats the action for the given number of seconds. The loop needs no stack, because the
--- runtime walks through the stack of a thread that blocks, before the next thread runs.
-during :: Double -> IO a -> IO [a]
-during seconds act = do
-  begun <- time
-  let go results = do
-        result <- act
-        over <- (> begun + seconds * 1e9) <$> time
-        (if over then pure else go) (result : results)
-  go []
-
--- | Waits as the driver of a device does: outside GHC's runtime, whose threads are all idle
--- meanwhile, and without its timers, which the sleeping task may use too.
-foreign import ccall safe "usleep" usleep :: CUInt -> IO CInt
+  if gapName gap == "hot"
+    then reactionTimes stage gap 3 >>= report ["reaction", load] variant (shares ++ [("p99.9", 0.999)])
+    else reactionTimes stage gap 2.5 >>= report ["reaction", gapName gap, load] variant shares
+ where
+  shares = [("p50", 0.5), ("p99", 0.99)]
 
 -- | Other agents, for which nothing changes.
 crowd :: Int -> IO ()
@@ -147,25 +102,3 @@ crowd n = when (n > 0) $ do
   latch <- newLatch n
   replicateM_ n (newAgent >>= \agent -> forkIO (mission agent (countDown latch)))
   awaitLatch latch
-
--- | A search that allocates all the time, and keeps little alive: all ways to place the queens.
-searching :: IO ()
-searching = for_ (cycle [6, 7, 8]) $ evaluate . length . queens
-
-queens :: Int -> [[Int]]
-queens n = go n
- where
-  go 0 = [[]]
-  go k = [q : others | others <- go (k - 1 :: Int), q <- [1 .. n], and (zipWith (apart q) others [1 ..])]
-  apart q other distance = q /= other && abs (q - other) /= distance
-
--- | A calculation that allocates little: it can be interrupted every few microseconds.
-counting :: IO ()
-counting = for_ [1 ..] $ evaluate . steps 10000
-
--- | Steps of a random number generator.
-steps :: Int -> Int -> Int
-steps n seed
-  | n == 0 = seed
-  | otherwise = steps (n - 1) (seed * 6364136223846793005 + 1442695040888963407)
-{-# NOINLINE steps #-}

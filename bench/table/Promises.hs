@@ -11,7 +11,7 @@ import Row
 promises :: [Group]
 promises =
   [trying, together, reacting, manyBranches, rules, unchangedRules, longPrograms]
-    ++ [reactions, besideComputation, idleFleet, fleetBytes, fleetTime]
+    ++ [reactions, coldReactions, besideComputation, plainReactions, idleFleet, fleetBytes, fleetTime]
     ++ [seamTime, seamBytes, simulator, simulatedDay, explorations]
 
 -- What the operators cost, compared with the same by hand or in a behaviour tree.
@@ -93,6 +93,20 @@ reactions =
       , ["reaction among 100000 p99 ours" `within` 5 `times` "reaction among 0 p99 ours"]
       ]
 
+-- The same compared with BehaviorTree.CPP; also when the process is idle between the changes.
+
+coldReactions :: Group
+coldReactions =
+  Group "The same, changes every 0.3 ms, or every 2 ms (cold): microseconds" "-I0 -A16m -qm, with -N1 or -N2" $
+    [ reaction setting share "ours" `within` 1 `times` fromString (unwords ["btcpp reaction", gap, share])
+    | (gap, settings) <- [("hot", ["N1", "N2"]), ("cold", cold)]
+    , setting <- settings
+    , share <- ["p50", "p99"]
+    ]
+      ++ [reaction setting share "ours" `beside` reaction setting share "bare" | setting <- cold, share <- ["p50", "p99"]]
+ where
+  cold = ["cold N1", "cold N2"]
+
 -- With two capabilities, the computation has one of them for itself. With one, a thread that is
 -- woken waits until the time slice of the computation ends; the operator needs three such waits,
 -- one after the other.
@@ -107,6 +121,27 @@ besideComputation =
       ++ [noTarget (reaction setting share whose) | (setting, whose) <- others, share <- ["p50", "p99"]]
  where
   others = [("busy N2", "bare"), ("busy N1", "ours"), ("busy N1", "bare")]
+
+-- Where threads run is decided by 'pinned' or, without it, by GHC. In the reference no thread is
+-- moved.
+
+plainReactions :: Group
+plainReactions =
+  Group
+    "A program without other options, changes every 0.3 ms (hot), 5 ms (colder): microseconds"
+    "-N1, -N2, or -N2 -qm"
+    $ [ plain "N2" gap share "pinned alone branch" `within` 1.5 `times` plain "N2 -qm" gap share "alone branch"
+      | gap <- gaps
+      , share <- shares
+      ]
+      ++ [noTarget (plain setting gap share situation) | (setting, situation) <- others, gap <- gaps, share <- shares]
+ where
+  gaps = ["hot", "colder"]
+  shares = ["p50", "p99"]
+  others = ("N1", "alone thread") : [("N2", situation) | situation <- unmarked ++ marked]
+  unmarked = ["alone thread", "alone branch", "busy thread", "busy branch"]
+  marked = ["pinned alone thread", "pinned busy thread", "pinned busy branch"]
+  plain setting gap share situation = fromString (unwords ["plain", setting, gap, share, situation])
 
 reaction :: String -> String -> String -> Figure
 reaction setting share whose = fromString (unwords ["reaction", setting, share, whose])
