@@ -30,6 +30,9 @@ import Behavior.Internal.Scope
 --
 -- [Result, failure, fault, cancellation] Those of the behaviour, which runs in a branch.
 --
+-- What a pinned thread starts by an operator is pinned, too; so the operators that are called in a
+-- thread of 'Control.Concurrent.forkOn' stay on its capability without this function.
+--
 -- It has no effect in a simulation, with one capability, and without @-threaded@. If
 -- 'Control.Concurrent.setNumCapabilities' takes the capability away, GHC moves all of these threads
 -- to another.

@@ -75,9 +75,9 @@ rSelect condition left right = react "rSelect" condition $ \case
 --   recovery does not run.
 -- [Failure] Of the task or the recovery: ends the operator with it. If the task
 --   fails /while it is being stopped/, the recovery runs first: a cleanup that
---   fails must not keep the robot from its charger. A condition that fails, or
---   that no longer has a value, is not \"false\": the task is stopped and the
---   operator fails.
+--   fails must not keep the robot from its charger. (If the recovery then fails, too, the
+--   task's failure is thrown.) A condition that fails, or that no longer has a value, is not
+--   \"false\": the task is stopped and the operator fails.
 -- [Fault] Likewise.
 -- [Cancellation] Only the caller can interrupt the recovery; so an outer 'monitor'
 --   outranks an inner one. Requests the stop of everything together; returns after everything
