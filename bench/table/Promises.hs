@@ -98,14 +98,13 @@ reactions =
 coldReactions :: Group
 coldReactions =
   Group "The same, changes every 0.3 ms, or every 2 ms (cold): microseconds" "-I0 -A16m -qm, with -N1 or -N2" $
-    [ reaction setting share "ours" `within` 1 `times` fromString (unwords ["btcpp reaction", gap, share])
-    | (gap, settings) <- [("hot", ["N1", "N2"]), ("cold", cold)]
-    , setting <- settings
-    , share <- ["p50", "p99"]
-    ]
-      ++ [reaction setting share "ours" `beside` reaction setting share "bare" | setting <- cold, share <- ["p50", "p99"]]
+    [reaction setting share "ours" `within` 1 `times` theirs "cold" share | setting <- cold, share <- shares]
+      ++ [reaction setting share "ours" `beside` theirs "hot" share | setting <- ["N1", "N2"], share <- shares]
+      ++ [reaction setting share "ours" `beside` reaction setting share "bare" | setting <- cold, share <- shares]
  where
   cold = ["cold N1", "cold N2"]
+  shares = ["p50", "p99"]
+  theirs gap share = fromString (unwords ["btcpp reaction", gap, share])
 
 -- With two capabilities, the computation has one of them for itself. With one, a thread that is
 -- woken waits until the time slice of the computation ends; the operator needs three such waits,
