@@ -7,6 +7,7 @@ import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
 import qualified Behavior.MonitorSpec
+import qualified Behavior.DecideSpec
 import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
@@ -53,6 +54,7 @@ main = hspec $ do
   describe "Failure" Behavior.FailureSpec.spec
   describe "Parallel" $ do
     Behavior.ParallelSpec.spec
+    Behavior.DecideSpec.spec
     Behavior.PinnedSpec.spec
     describe "scoped and fork" Behavior.ScopedSpec.spec
   describe "Signal" $ do

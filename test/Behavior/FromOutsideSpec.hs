@@ -17,7 +17,7 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Internal.Runtime (atomically)
-import Behavior.Parallel (allOf, firstOf, scoped)
+import Behavior.Parallel (allOf, decide, firstOf, scoped)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)
@@ -36,6 +36,7 @@ operators =
   , ("both", \act -> "" <$ both act hang)
   , ("firstOf", \act -> firstOf [hang, act])
   , ("allOf", \act -> concat <$> allOf [act, hang])
+  , ("decide", \act -> decide (\ends -> either throwIO pure <$> head ends) [act, hang])
   , ("scoped", scoped . const)
   , ("withShared", Signal.withShared (pure True) . const)
   , ("timeout", timeout 3600)

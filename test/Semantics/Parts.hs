@@ -26,6 +26,7 @@ parts = \case
   Both a b -> [a, b]
   FirstOf as -> as
   AllOf as -> as
+  Decide _ as b -> as ++ [b]
   RSelect s a b -> ofSignal s ++ [a, b]
   Monitor s a b -> ofSignal s ++ [a, b]
   Switch s as -> ofSignal s ++ as
@@ -60,6 +61,7 @@ rebuild p new = case (p, new) of
   (Both _ _, [a, b]) -> Both a b
   (FirstOf _, as) -> FirstOf as
   (AllOf _, as) -> AllOf as
+  (Decide choice _ _, as@(_ : _)) -> Decide choice (init as) (last as)
   (RSelect s _ _, as) | (s', [a, b]) <- sensing s as -> RSelect s' a b
   (Monitor s _ _, as) | (s', [a, b]) <- sensing s as -> Monitor s' a b
   (Switch s _, as) | (s', bs) <- sensing s as -> Switch s' bs
