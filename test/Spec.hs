@@ -19,6 +19,7 @@ import qualified Behavior.PromisesSpec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
 import qualified Behavior.FilterSpec
+import qualified Behavior.RepeatingSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
 import qualified Behavior.STMSpec
@@ -70,6 +71,7 @@ main = hspec $ do
   describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
   describe "Time" $ do
     Behavior.TimeSpec.spec
+    Behavior.RepeatingSpec.spec
     Behavior.TimerWheelSpec.spec
   describe "STM" Behavior.STMSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec

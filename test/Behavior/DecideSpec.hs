@@ -54,7 +54,7 @@ asking = do
   it "about more ends each time, and at last about all, under all schedules" $ do
     report <- explore (exhaustively 2) $ \simulate' -> do
       (asked, remember) <- recorder
-      run <- simulate' (decide (\ends -> remember ends (() <$ sequence ends >> Just (pure ()))) [pure 'a', pure 'b', pure 'c'])
+      run <- simulate' (decide (\ends -> remember ends (pure () <$ sequence ends)) [pure 'a', pure 'b', pure 'c'])
       returned run ()
       counts <- map (length . catMaybes) <$> asked
       unless (head counts == 0 && last counts == 3 && and (zipWith (<) counts (drop 1 counts))) $ fail (show counts)
@@ -140,7 +140,7 @@ unchosen = do
   it "by a fault that names decide, if all have ended and nothing is chosen" $
     for_ [[], [pure ()], [pure (), failWith "a", pure ()]] $ \behaviors -> do
       end <- ending (decide (const Nothing) behaviors) :: IO (Ending ())
-      end `shouldSatisfy` \e -> case e of FaultedWith why -> "decide: " `isInfixOf` why; _ -> False
+      end `shouldSatisfy` \case FaultedWith why -> "decide: " `isInfixOf` why; _ -> False
 
   it "by a cancellation that arrives while the function computes" $ do
     computing <- newEmptyMVar

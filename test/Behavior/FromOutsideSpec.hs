@@ -36,7 +36,7 @@ operators =
   , ("both", \act -> "" <$ both act hang)
   , ("firstOf", \act -> firstOf [hang, act])
   , ("allOf", \act -> concat <$> allOf [act, hang])
-  , ("decide", \act -> decide (\ends -> either throwIO pure <$> head ends) [act, hang])
+  , ("decide", \act -> decide (fmap (either throwIO pure) . head) [act, hang])
   , ("scoped", scoped . const)
   , ("withShared", Signal.withShared (pure True) . const)
   , ("timeout", timeout 3600)

@@ -122,7 +122,7 @@ toBehavior t = \case
     pure 0
   Decide m as -> observed t "decide" Concurrent ["too few have succeeded"] $ \branch -> do
     live <- newIORef (0 :: Int)
-    let counted act = bracket_ (count 1) (count (-1)) act
+    let counted = bracket_ (count 1) (count (-1))
         count k = atomicModifyIORef' live (\n -> (n + k, ()))
         chosen = do
           n <- readIORef live
