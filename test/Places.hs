@@ -76,6 +76,8 @@ places =
   , inThread "switch" "branch" (\act -> Signal.switch (pure 'a') (const act))
   , inThread "teleoReactive" "rule 2" $ \act ->
       Signal.teleoReactive [(pure False, hang), (pure True, act)]
+  , inThread "insteadWhen" "branch" (Signal.insteadWhen (pure False) hang)
+  , inThread "insteadWhen" "emergency" (\act -> Signal.insteadWhen (pure True) act hang)
   , inThread "whileHolding" "branch" (Signal.whileHolding (pure True))
   , inThread "withShared" "body" (\act -> Signal.withShared (pure ()) (const act))
   , inThread "waitUntil" "polling" $ \act ->

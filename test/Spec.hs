@@ -6,6 +6,7 @@ import qualified Behavior.TimerWheelSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
+import qualified Behavior.InsteadWhenSpec
 import qualified Behavior.MonitorSpec
 import qualified Behavior.DecideSpec
 import qualified Behavior.EqualitySuppressionSpec
@@ -68,6 +69,7 @@ main = hspec $ do
     Behavior.OutcomeSpec.spec
     Behavior.ReactiveSpec.spec
     Behavior.MonitorSpec.spec
+    Behavior.InsteadWhenSpec.spec
   describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
   describe "Time" $ do
     Behavior.TimeSpec.spec

@@ -43,6 +43,8 @@ operators =
   , ("whileHolding", Signal.whileHolding (pure True))
   , ("switch", Signal.switch (pure 'k') . const)
   , ("teleoReactive", \act -> Signal.teleoReactive [(pure True, act)])
+  , ("insteadWhen", Signal.insteadWhen (pure False) (pure ""))
+  , ("insteadWhen (its emergency)", \act -> Signal.insteadWhen (pure True) act (pure ""))
   , ("rSelect", \act -> Signal.rSelect (pure True) act (pure ""))
   , ("monitor", Signal.monitor (pure False) (pure ()))
   , ("monitor (its recovery)", \act -> Signal.monitor (pure True) (void act) (pure ""))
@@ -124,6 +126,7 @@ usersCode = do
     [ ("whileHolding", Signal.whileHolding)
     , ("rSelect", \signal act -> Signal.rSelect signal act (pure ()))
     , ("monitor", \signal -> Signal.monitor (not <$> signal) (pure ()))
+    , ("insteadWhen", \signal -> Signal.insteadWhen (not <$> signal) (pure ()))
     , ("switch", \signal -> Signal.switch signal . const)
     , ("teleoReactive", \signal act -> Signal.teleoReactive [(signal, act)])
     ] :: [(String, Signal Bool -> Behavior () -> Behavior ())]

@@ -76,6 +76,7 @@ within' inScope sharing = go
       , (3, Decide <$> choices <*> few less <*> less)
       , (4, RSelect <$> sensed <*> less <*> less)
       , (5, Monitor <$> sensed <*> takingTime less <*> less)
+      , (3, InsteadWhen <$> sensed <*> less <*> less)
       , (2, Switch <$> sensed <*> few1 less)
       , (2, TeleoReactive <$> few ((,) <$> sensed <*> less))
       , (1, WaitUntil <$> sensed)

@@ -74,6 +74,7 @@ data Program
     Decide Choice [Program] Program
   | RSelect Signal Program Program
   | Monitor Signal Program Program
+  | InsteadWhen Signal Program Program
   | -- | The number is the index of the branch, from zero; larger numbers select the last
     -- branch.
     Switch Signal [Program]

@@ -173,6 +173,7 @@ toBehavior emit stage = go
     Decide choice ps q -> decide (chosenFrom choice (go q)) (map go ps)
     RSelect signal left right -> rSelect (holds <$> level signal) (go left) (go right)
     Monitor signal recovery task -> monitor (holds <$> level signal) (void (go recovery)) (go task)
+    InsteadWhen signal emergency p -> insteadWhen (holds <$> level signal) (go emergency) (go p)
     Switch signal branches -> switch (level signal) (\n -> go (branches !! max 0 (min n (length branches - 1))))
     TeleoReactive rules -> teleoReactive [(holds <$> level signal, go p) | (signal, p) <- rules]
     WaitUntil signal -> Unit <$ waitUntil (holds <$> level signal)

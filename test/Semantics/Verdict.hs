@@ -12,6 +12,7 @@ module Semantics.Verdict
   , valueOf
   , reaction
   , nameOf
+  , recoveryOf
   ) where
 
 import Data.List (find)
@@ -107,6 +108,7 @@ reaction :: Program -> Int -> Reaction
 reaction p value = case p of
   RSelect _ left right -> Run (if isTrue then left else right)
   Monitor _ recovery task -> if isTrue then RunToEnd recovery else Run task
+  InsteadWhen _ emergency act -> if isTrue then RunToEnd emergency else Run act
   Switch _ branches -> Run (branches !! max 0 (min value (length branches - 1)))
   TeleoReactive rules -> if value < 0 then Idle else Run (snd (rules !! value))
   WaitUntil _ -> if isTrue then Conclude (Succeeded Unit) else Idle
@@ -121,7 +123,14 @@ nameOf :: Program -> Int -> Label
 nameOf p value = case p of
   RSelect {} -> if holds value then "rSelect: left" else "rSelect: right"
   Monitor {} -> "monitor: task"
+  InsteadWhen {} -> "insteadWhen: branch"
   Switch {} -> "switch: branch"
   TeleoReactive _ -> "teleoReactive: rule " ++ show (value + 1)
   WhileHolding {} -> "whileHolding: branch"
   _ -> "timeout: branch"
+
+-- | The name of the branch that runs to its end.
+recoveryOf :: Program -> Label
+recoveryOf p = case p of
+  InsteadWhen {} -> "insteadWhen: emergency"
+  _ -> "monitor: recovery"
