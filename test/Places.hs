@@ -12,10 +12,11 @@ module Places
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception (SomeException, throwIO)
 import Control.Monad (void)
+import Data.Maybe (listToMaybe)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
-import Behavior.Parallel (allOf, await, firstOf, fork, pinned, scoped, unpinned)
+import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically, timeout)
 import Support
@@ -56,6 +57,9 @@ places =
   , inThread "firstOf" "2" (\act -> firstOf [hang, act, hang])
   , inThread "allOf" "1" (\act -> void (allOf [act, pure (), pure ()]))
   , inThread "allOf" "3" (\act -> void (allOf [pure (), pure (), act]))
+  , inThread "decide" "1" (\act -> decide firstEnd [act, hang])
+  , inThread "decide" "2" (\act -> decide firstEnd [hang, act])
+  , inPlace "what decide chooses" (\act -> decide (fmap (const act) . firstEnd) [pure ()])
   , inThread "scoped" "body" (\act -> scoped (const act))
   , inThread "scoped" "fork" $ \act ->
       scoped (\nursery -> fork nursery act >>= atomically . await)
@@ -72,12 +76,15 @@ places =
   , inThread "switch" "branch" (\act -> Signal.switch (pure 'a') (const act))
   , inThread "teleoReactive" "rule 2" $ \act ->
       Signal.teleoReactive [(pure False, hang), (pure True, act)]
+  , inThread "insteadWhen" "branch" (Signal.insteadWhen (pure False) hang)
+  , inThread "insteadWhen" "emergency" (\act -> Signal.insteadWhen (pure True) act hang)
   , inThread "whileHolding" "branch" (Signal.whileHolding (pure True))
   , inThread "withShared" "body" (\act -> Signal.withShared (pure ()) (const act))
   , inThread "waitUntil" "polling" $ \act ->
       Signal.waitUntil (Signal.polling 3600 (True <$ act))
   ]
  where
+  firstEnd ends = listToMaybe [either throwIO pure end | Just end <- ends]
   inPlace name = Place name Nothing
   inThread operator name = Place (show label) (Just label) where label = Label operator name
   noException :: SomeException -> Bool

@@ -253,6 +253,12 @@ relation = do
       AllOf [act "a" 2 (Succeeds 1), act "b" 1 (Succeeds 2)] `endsIn` [Gave 2 (Succeeded (Several [Number 1, Number 2]))]
       AllOf [act "a" 2 (Succeeds 1), act "b" 1 Fails] `endsIn` [Gave 1 (Failed "b")]
       Both (act "a" 2 Fails) (stoppedBy (StopsAfter 3) "b") `endsIn` [Gave 5 (Failed "a")]
+    it "decide as soon as enough have succeeded, or too few are left, and then run what is chosen" $ do
+      let of3 m = Decide (AtLeast m) [act "a" 3 (Succeeds 1), act "b" 1 Fails, stoppedBy (StopsAfter 2) "c"] (act "d" 1 (Succeeds 7))
+      of3 0 `endsIn` [Gave 1 (Succeeded (Number 7))]
+      of3 1 `endsIn` [Gave 6 (Succeeded (Number 7))]
+      of3 3 `endsIn` [Gave 3 (Failed tooFew)]
+      Decide NoChoice [act "a" 3 (Succeeds 1), act "b" 1 Fails] (act "d" 1 (Succeeds 7)) `endsIn` [Gave 3 (Faulted noneChosen)]
     it "stop the children when the body ends, and body and children when a child fails" $ do
       Scoped (Fork (stoppedBy (StopsAfter 2) "a") `Then` act "b" 1 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
       Scoped (Fork (act "a" 1 Fails) `Then` stoppedBy (StopsAfter 2) "b") `endsIn` [Gave 3 (Failed "a")]

@@ -6,7 +6,9 @@ import qualified Behavior.TimerWheelSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
+import qualified Behavior.InsteadWhenSpec
 import qualified Behavior.MonitorSpec
+import qualified Behavior.DecideSpec
 import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
@@ -18,6 +20,7 @@ import qualified Behavior.PromisesSpec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
 import qualified Behavior.FilterSpec
+import qualified Behavior.RepeatingSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
 import qualified Behavior.STMSpec
@@ -53,6 +56,7 @@ main = hspec $ do
   describe "Failure" Behavior.FailureSpec.spec
   describe "Parallel" $ do
     Behavior.ParallelSpec.spec
+    Behavior.DecideSpec.spec
     Behavior.PinnedSpec.spec
     describe "scoped and fork" Behavior.ScopedSpec.spec
   describe "Signal" $ do
@@ -65,9 +69,11 @@ main = hspec $ do
     Behavior.OutcomeSpec.spec
     Behavior.ReactiveSpec.spec
     Behavior.MonitorSpec.spec
+    Behavior.InsteadWhenSpec.spec
   describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
   describe "Time" $ do
     Behavior.TimeSpec.spec
+    Behavior.RepeatingSpec.spec
     Behavior.TimerWheelSpec.spec
   describe "STM" Behavior.STMSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec

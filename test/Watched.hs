@@ -46,6 +46,7 @@ module Watched
     -- * The operators
   , Operator (..)
   , operators
+  , latched
   ) where
 
 import Control.Concurrent (ThreadId, myThreadId)
@@ -221,5 +222,11 @@ operators =
   , Operator "switch" (\c main other -> Signal.switch c (\holds -> if holds then main else other))
   , Operator "teleoReactive" $ \c main other ->
       Signal.teleoReactive [(c, main), (pure True, other)]
+  , Operator "insteadWhen" (\c main other -> Signal.insteadWhen (not <$> c) other main)
   , Operator "whileHolding" (\c main _ -> Signal.whileHolding c main)
   ]
+
+-- | Whether the change is latched: the second behaviour runs even if the first fails or faults
+-- while it stops.
+latched :: Operator -> Bool
+latched op = operator op `elem` ["monitor", "insteadWhen"]

@@ -19,7 +19,7 @@ import System.Exit (die)
 import System.Mem (performMajorGC)
 
 import Behavior
-import Behavior.Parallel (allOf, firstOf)
+import Behavior.Parallel (allOf, decide, firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically)
 import Measured
@@ -114,6 +114,7 @@ many waits =
     [ [ about n "firstOf" (\size -> firstOf (succeeds : take (size - 1) waits))
       , about n "firstOf, the last ends" (\size -> firstOf (take (size - 1) waits ++ [succeeds]))
       , about n "allOf" (\size -> void (allOf (replicate size succeeds)))
+      , about n "decide" (\size -> decide (\ends -> pure () <$ sequence ends) (replicate size succeeds))
       , about n "bare threads, stopped" (stopping . (`take` waits))
       ]
     | n <- [2, 10, 100, 1000]

@@ -9,6 +9,9 @@
 -- +---------------------------------+------------------+-------------------------------+
 -- | 'both', 'allOf'                 | all of them      | nothing; 'allOf' all results  |
 -- +---------------------------------+------------------+-------------------------------+
+-- | 'decide'                        | what a function  | the result of the behaviour   |
+-- |                                 | of the ends says | that the function chooses     |
+-- +---------------------------------+------------------+-------------------------------+
 -- | 'scoped' and 'fork'             | the scoped one   | its result                    |
 -- +---------------------------------+------------------+-------------------------------+
 --
@@ -28,6 +31,7 @@ module Behavior.Parallel
     -- * Any number
   , firstOf
   , allOf
+  , decide
 
     -- * Starting more while a behaviour runs
   , scoped

@@ -30,6 +30,7 @@ module Behavior.Signal
     -- ** Interrupting
   , rSelect
   , monitor
+  , insteadWhen
 
     -- ** Many branches
   , switch

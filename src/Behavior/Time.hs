@@ -1,5 +1,5 @@
 -- |
--- Time: the clock, sleeping, and time limits.
+-- Time: the clock, sleeping, trying again, doing something periodically, and time limits.
 --
 -- Durations are 'Seconds', written as literals.
 --
@@ -12,8 +12,14 @@ module Behavior.Time
 
     -- * Waiting
   , sleep
+  , sleepUntil
   , atomically
   , checkpoint
+
+    -- * Again
+  , retrying
+  , retryingWith
+  , every
 
     -- * Limits
   , timeout
@@ -21,4 +27,5 @@ module Behavior.Time
   ) where
 
 import Behavior.Internal.Reactive.Timeout
+import Behavior.Internal.Repeating
 import Behavior.Internal.Runtime

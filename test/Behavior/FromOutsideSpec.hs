@@ -17,7 +17,7 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Internal.Runtime (atomically)
-import Behavior.Parallel (allOf, firstOf, scoped)
+import Behavior.Parallel (allOf, decide, firstOf, scoped)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)
@@ -36,12 +36,15 @@ operators =
   , ("both", \act -> "" <$ both act hang)
   , ("firstOf", \act -> firstOf [hang, act])
   , ("allOf", \act -> concat <$> allOf [act, hang])
+  , ("decide", \act -> decide (fmap (either throwIO pure) . head) [act, hang])
   , ("scoped", scoped . const)
   , ("withShared", Signal.withShared (pure True) . const)
   , ("timeout", timeout 3600)
   , ("whileHolding", Signal.whileHolding (pure True))
   , ("switch", Signal.switch (pure 'k') . const)
   , ("teleoReactive", \act -> Signal.teleoReactive [(pure True, act)])
+  , ("insteadWhen", Signal.insteadWhen (pure False) (pure ""))
+  , ("insteadWhen (its emergency)", \act -> Signal.insteadWhen (pure True) act (pure ""))
   , ("rSelect", \act -> Signal.rSelect (pure True) act (pure ""))
   , ("monitor", Signal.monitor (pure False) (pure ()))
   , ("monitor (its recovery)", \act -> Signal.monitor (pure True) (void act) (pure ""))
@@ -123,6 +126,7 @@ usersCode = do
     [ ("whileHolding", Signal.whileHolding)
     , ("rSelect", \signal act -> Signal.rSelect signal act (pure ()))
     , ("monitor", \signal -> Signal.monitor (not <$> signal) (pure ()))
+    , ("insteadWhen", \signal -> Signal.insteadWhen (not <$> signal) (pure ()))
     , ("switch", \signal -> Signal.switch signal . const)
     , ("teleoReactive", \signal act -> Signal.teleoReactive [(signal, act)])
     ] :: [(String, Signal Bool -> Behavior () -> Behavior ())]

@@ -106,7 +106,7 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
     it ("nested in itself three times, throws the branch's fault when level " ++ show level ++ " is stopped") $ do
       (end, ran) <- nested op level (throwIO (Fault "main"))
       end `shouldBe` FaultedWith (show (Fault "main"))
-      ran `shouldBe` "main" : [show level | operator op == "monitor"]
+      ran `shouldBe` "main" : [show level | latched op]
 
   it "labels every thread with the operator and its branch" $ do
     events <- newLog
@@ -135,6 +135,7 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
   branches op = case operator op of
     "rSelect" -> ["left", "right"]
     "monitor" -> ["task", "recovery", "task"]
+    "insteadWhen" -> ["branch", "emergency"]
     "switch" -> ["branch", "branch"]
     "teleoReactive" -> ["rule 1", "rule 2"]
     _ -> ["branch"]

@@ -82,7 +82,7 @@ stopped =
       "monitor" -> (Gave "main again", ["main", "other", "main again"])
       _ -> (Gave "other", ["main", "other"])
    where
-    recovered = ["other" | operator op == "monitor", newState == Value False]
+    recovered = ["other" | latched op, newState == Value False]
 
 -- | The transaction that reads the change waits until the branch has ended, so that it
 -- finds both: then the end of the branch counts.

@@ -11,7 +11,7 @@ import Test.Hspec hiding (parallel)
 import Behavior
 import Behavior.Parallel (await, firstOf, fork, requestStop, scoped, tryAwait)
 import Behavior.STM (atomically, retry)
-import Behavior.Time (timeout)
+import Behavior.Time (every, retrying, timeout)
 import Memory (inConstantMemory)
 import Support
 
@@ -28,6 +28,15 @@ spec = guarded . describe "In constant memory:" $ do
   it "a million failed attempts" $
     inConstantMemory 1000000 $ \step ->
       attempt 1000000 (step >> failed) ? pure ()
+
+  it "a million tries, after pauses" $
+    inConstantMemory 1000000 $ \step ->
+      retrying (replicate 1000000 0) (step >> failed) ? pure ()
+
+  it "five thousand periods" $ do
+    left <- newIORef (5000 :: Int)
+    inConstantMemory 5000 $ \step ->
+      every 0.000001 (step >> atomicModifyIORef' left (\n -> (n - 1, n)) >>= \n -> if n <= 1 then failed else pure ()) ? pure ()
 
   it "a million recursions through the second behaviour of ?" $
     inConstantMemory 1000000 $ \step -> do

@@ -15,7 +15,7 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), withSink, sleepUntil)
+import Behavior.Internal.Runtime (Event (..), Label (..), withSink)
 import Behavior.Internal.Seconds (duration, period)
 import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, simulate)
 import Behavior.Time
@@ -70,6 +70,10 @@ lengths = do
       sleep s `shouldThrow` isRefusal "sleep: a duration is zero or more seconds, not " s
       timeout s (pure ()) `shouldThrow` isRefusal "timeout: a duration is zero or more seconds, not " s
       duration "x" s `shouldThrow` isRefusal "x: a duration is zero or more seconds, not " s
+
+  it "is any number where a point in time is required" $ do
+    sleepUntil notANumber `shouldThrow` isRefusal "sleepUntil: a point in time is a number, not " notANumber
+    sleepUntil (-infinite)
 
   it "must be at least a microsecond where a period is required" $ do
     for_ [0, -1, notANumber, 5e-324, 0.0000009] $ \s ->

@@ -23,7 +23,7 @@ import Control.Monad (unless, void, when)
 import Data.Maybe (fromMaybe, listToMaybe)
 import Test.QuickCheck (Gen, choose, elements, frequency, vectorOf)
 
-import Behavior.Internal.Failure (isCancellation)
+import Behavior.Internal.Failure (Behavior, BehaviorFailed, isCancellation)
 import Behavior.Internal.Runtime (atomically)
 import Promises.Language (Language)
 import qualified Promises.Language as L
@@ -45,7 +45,7 @@ data Level
   | ByNeighbour
   deriving (Eq, Show)
 
-data Place = InParallel | InBoth | InFirst | InAll | InSelect | InTask | InHolding | InTimeout | InAttempt | InFailing | InScope
+data Place = InParallel | InBoth | InFirst | InAll | InDecision | InSelect | InTask | InHolding | InTimeout | InAttempt | InFailing | InScope
   deriving (Bounded, Enum, Eq, Show)
 
 levels :: Size -> Gen Levels
@@ -79,6 +79,7 @@ stoppedAtItsOwnLevel stage l (Levels these) = do
         Around InBoth -> L.both l (pure ()) act
         Around InFirst -> L.firstOf l [act, hang]
         Around InAll -> void (L.allOf l [act, pure ()])
+        Around InDecision -> L.decide l firstEnd [act, hang]
         Around InSelect -> L.rSelect l (pure False) hang act
         Around InTask -> L.monitor l (pure False) hang act
         Around InHolding -> L.whileHolding l (pure True) act
@@ -110,7 +111,7 @@ isStop = \case
 data Group = Group Composition [StopHandling] Cause
   deriving (Show)
 
-data Composition = AsFirst | AsAll | AsPair | AsRace | AsForks | AsTaskAndSensor
+data Composition = AsFirst | AsDecision | AsAll | AsPair | AsRace | AsForks | AsTaskAndSensor
   deriving (Eq, Show)
 
 -- | How one of them handles its stop request.
@@ -127,8 +128,8 @@ data Cause = ByCaller | ByFailure
 
 groups :: Size -> Gen Group
 groups size = do
-  composition <- elements ([AsFirst, AsAll, AsPair, AsRace] ++ [w | size == Full, w <- [AsForks, AsTaskAndSensor]])
-  n <- if size == Full && composition `elem` [AsFirst, AsAll, AsForks] then choose (2, 3) else pure (2 :: Int)
+  composition <- elements ([AsFirst, AsDecision, AsAll, AsPair, AsRace] ++ [w | size == Full, w <- [AsForks, AsTaskAndSensor]])
+  n <- if size == Full && composition `elem` [AsFirst, AsDecision, AsAll, AsForks] then choose (2, 3) else pure (2 :: Int)
   -- Two uninterruptible ones would wait for each other.
   uninterruptibleOne <- choose (0, 2 * n)
   cause <- if composition == AsTaskAndSensor || size == Tiny then pure ByCaller else elements [ByCaller, ByFailure]
@@ -156,6 +157,7 @@ stoppedTogether stage l (Group composition handlings cause) = do
       culprit = [allInside >> void (finish 0 Fails) | cause == ByFailure]
       together = case (composition, others ++ culprit) of
         (AsAll, these) -> void (L.allOf l these)
+        (AsDecision, these) -> L.decide l firstEnd these
         (AsPair, [a, b]) -> L.both l a b
         (AsRace, [a, b]) -> L.parallel l a b
         (AsForks, a : these) -> L.beside l these a
@@ -176,6 +178,10 @@ stoppedTogether stage l (Group composition handlings cause) = do
     (ByFailure, Gave (FailedWith _)) -> pure ()
     _ -> broken ("it ended: " ++ show end)
 
+-- | Chooses what has ended first; on a tie the leftmost.
+firstEnd :: [Maybe (Either BehaviorFailed a)] -> Maybe (Behavior a)
+firstEnd ends' = listToMaybe [either throwIO pure end | Just end <- ends']
+
 -- * Ties
 
 -- | Concurrent behaviours. Those in the list end one after the other, in this order (and from
@@ -185,8 +191,8 @@ data Relay = Relay Composition Int [(Int, End)]
 
 relays :: Size -> Gen Relay
 relays size = do
-  composition <- elements [AsFirst, AsAll, AsPair, AsRace]
-  n <- if size == Full && composition `elem` [AsFirst, AsAll] then choose (2, 3) else pure (2 :: Int)
+  composition <- elements [AsFirst, AsDecision, AsAll, AsPair, AsRace]
+  n <- if size == Full && composition `elem` [AsFirst, AsDecision, AsAll] then choose (2, 3) else pure (2 :: Int)
   first <- choose (0, n - 1)
   runners <- traverse (\k -> (,) k <$> elements [Succeeds, Fails]) [first .. n - 1]
   let toEnd = composition `elem` [AsAll, AsPair] && first > 0 && all ((== Succeeds) . snd) runners
@@ -205,6 +211,7 @@ leftWins stage l (Relay composition n runners) = do
       these = [fromMaybe hang (lookup k runs) | k <- [0 .. n - 1]]
       whole = case (composition, these) of
         (AsAll, _) -> sum <$> L.allOf l these
+        (AsDecision, _) -> L.decide l firstEnd these
         (AsPair, [a, b]) -> 1 <$ L.both l a b
         (AsRace, [a, b]) -> firstNumber <$ L.parallel l a b
         _ -> L.firstOf l these

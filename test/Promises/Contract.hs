@@ -21,8 +21,9 @@ import Data.IORef
 import Data.List (intercalate, sortOn)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
+import Data.Maybe (isNothing)
 
-import Behavior (Behavior)
+import Behavior (Behavior, BehaviorFailed, failWith)
 import Behavior.Internal.Runtime (Event (..), Label (..), atomically, liveThreadCount, withSink)
 import Behavior.Signal (Signal, watching)
 import Promises.Language (Language)
@@ -119,6 +120,14 @@ toBehavior t = \case
     unless (and (zipWith agree expected results) && length results == length as) $
       recordViolation t Outcomes ("allOf gave " ++ show results)
     pure 0
+  Decide m as -> observed t "decide" Concurrent ["too few have succeeded"] $ \branch -> do
+    live <- newIORef (0 :: Int)
+    let counted = bracket_ (count 1) (count (-1))
+        count k = atomicModifyIORef' live (\n -> (n + k, ()))
+        chosen = do
+          n <- readIORef live
+          unless (n == 0) $ recordViolation t Structure ("what decide has chosen runs, but " ++ show n ++ " branches have not ended")
+    L.decide l (atLeast m chosen) [counted (branch n (show n) a) | (n, a) <- zip [1 ..] as]
   Beside as b -> observed t "scoped" Concurrent [] $ \branch ->
     L.beside l [void (branch n "fork" a) | (n, a) <- zip [2 ..] as] (branch 1 "body" b)
   Select sensing a b -> observed t "rSelect" Reactive [] $ \branch ->
@@ -140,6 +149,15 @@ toBehavior t = \case
     Leaf act -> Just (number act)
     _ -> Nothing
   agree expected result = maybe True (== result) expected
+
+-- | The first result when that many have succeeded.
+atLeast :: Int -> Behavior () -> [Maybe (Either BehaviorFailed Int)] -> Maybe (Behavior Int)
+atLeast m chosen ends'
+  | length results >= m = Just (head results <$ chosen)
+  | length results + length (filter isNothing ends') < m = Just (chosen >> failWith "too few have succeeded")
+  | otherwise = Nothing
+ where
+  results = [n | Just (Right n) <- ends']
 
 recordViolation :: Context -> Clause -> String -> IO ()
 recordViolation t clause = append (recordedViolations t) . (,) clause

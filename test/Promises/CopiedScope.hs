@@ -65,6 +65,8 @@ data Flaw
   | ForgetsThePeriod
   | MistakesTheStop
   | DoesNotLabel
+  | ChoosesWhenAllHaveEnded
+  | RunsTheChosenTooEarly
   deriving (Bounded, Enum, Eq, Ord, Show)
 
 data Scope = Scope (Maybe Flaw) String (IORef [SomeBranch])

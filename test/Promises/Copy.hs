@@ -13,11 +13,12 @@ module Promises.Copy
 import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
-import Control.Monad (forever, unless, void, (>=>))
+import Control.Monad (forever, join, unless, void, (>=>))
 import Data.Foldable (asum, traverse_)
+import Data.Maybe (catMaybes, isJust)
 import Data.Traversable (for)
 
-import Behavior (Behavior, failWith)
+import Behavior (Behavior, BehaviorFailed, failWith)
 import Behavior.Internal.Failure (isCancellation, isFailure, trySynchronous)
 import Behavior.Internal.Reactive.Timeout (TimedOut (..))
 import Behavior.Internal.Runtime
@@ -37,6 +38,7 @@ copied flaw =
     , both = \left right -> void (gather flaw "both" [("left", void left), ("right", void right)])
     , firstOf = race flaw "firstOf" . zip numbers
     , allOf = gather flaw "allOf" . zip numbers
+    , decide = decideWith flaw
     , beside = besideWith flaw
     , rSelect = \condition left right ->
         react flaw "rSelect" (possiblyFlawed condition) (\c -> if c then Run "left" left else Run "right" right)
@@ -94,6 +96,30 @@ gather flaw operator behaviors = structured flaw operator $ \scope -> do
  where
   wrongToIO :: Outcome a -> IO b
   wrongToIO wrong = outcomeToIO wrong >> throwIO (ErrorCall "unreachable")
+
+decideWith :: Maybe Flaw -> ([Maybe (Either BehaviorFailed a)] -> Maybe (Behavior b)) -> [Behavior a] -> Behavior b
+decideWith flaw choose behaviors
+  | Just chosen <- choose (Nothing <$ behaviors) = chosen
+  | otherwise = join . structured flaw "decide" $ \scope -> do
+      branches <- traverse (uncurry (branch scope)) (zip (map show [1 :: Int ..]) behaviors)
+      chosen <- atomically $ do
+        outcomes <- traverse (\b -> (Just <$> outcomeOf b) `orElse` pure Nothing) branches
+        let allEnded = all isJust outcomes
+        check (allEnded || flaw /= Just ChoosesWhenAllHaveEnded)
+        case (catMaybes outcomes >>= wrong, choose (map (>>= end) outcomes)) of
+          (e : _, _) -> pure (throwIO e)
+          ([], Just act) -> pure (pure act)
+          ([], Nothing) -> check allEnded >> pure (throwIO (ErrorCall "decide"))
+      if flaw == Just RunsTheChosenTooEarly then pure . pure <$> join chosen else pure chosen
+ where
+  wrong = \case
+    Faulted e -> [e]
+    Stopped e -> [e]
+    Done _ -> []
+  end = \case
+    Done (Right a) -> Just (Right a)
+    Done (Left e) -> Left <$> fromException e
+    _ -> Nothing
 
 -- * Reactive
 

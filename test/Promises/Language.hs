@@ -11,7 +11,7 @@ module Promises.Language
 import Control.Exception (SomeException)
 import Data.Foldable (traverse_)
 
-import Behavior (Behavior)
+import Behavior (Behavior, BehaviorFailed)
 import qualified Behavior
 import Behavior.Parallel (fork, scoped)
 import qualified Behavior.Parallel as Parallel
@@ -30,6 +30,7 @@ data Language = Language
   , both :: forall a b. Behavior a -> Behavior b -> Behavior ()
   , firstOf :: forall a. [Behavior a] -> Behavior a
   , allOf :: forall a. [Behavior a] -> Behavior [a]
+  , decide :: forall a b. ([Maybe (Either BehaviorFailed a)] -> Maybe (Behavior b)) -> [Behavior a] -> Behavior b
   , beside :: forall a. [Behavior ()] -> Behavior a -> Behavior a
   -- ^ Forks the behaviours of the list in a scope, then runs the other as its body.
   , rSelect :: forall a. Signal Bool -> Behavior a -> Behavior a -> Behavior a
@@ -50,6 +51,7 @@ sound =
     , both = Behavior.both
     , firstOf = Parallel.firstOf
     , allOf = Parallel.allOf
+    , decide = Parallel.decide
     , beside = \others body -> scoped (\nursery -> traverse_ (fork nursery) others >> body)
     , rSelect = Signal.rSelect
     , monitor = Signal.monitor

@@ -28,6 +28,8 @@ data Tree
   | Both Tree Tree
   | FirstOf [Tree]
   | AllOf [Tree]
+  | -- | When that many have succeeded, the results; or fails.
+    Decide Int [Tree]
   | Beside [Tree] Tree
   | Select Sensing Tree Tree
   | Monitor Sensing Tree Tree
@@ -93,6 +95,7 @@ programsOf root size = case size of
     , Both <$> less n <*> less n
     , FirstOf <$> several (less n)
     , AllOf <$> several (less n)
+    , Decide <$> choose (1, 2) <*> several (less n)
     , Beside <$> (choose (1, 2) >>= \k -> vectorOf k (less n)) <*> less n
     ]
   several g = choose (1, 3) >>= \k -> vectorOf k g
@@ -107,6 +110,7 @@ programsOf root size = case size of
         , Both <$> less n <*> less n
         , FirstOf <$> vectorOf 2 (less n)
         , AllOf <$> vectorOf 2 (less n)
+        , Decide <$> choose (1, 2) <*> vectorOf 2 (less n)
         , Beside <$> vectorOf 1 (less n) <*> less n
         ]
 
@@ -123,6 +127,7 @@ numbered = snd . go 1
     Both a b -> two Both n a b
     FirstOf as -> FirstOf <$> all' n as
     AllOf as -> AllOf <$> all' n as
+    Decide m as -> Decide m <$> all' n as
     Beside as b -> let (m, as') = all' n as in Beside as' <$> go m b
     Select l a b -> two (Select l) n a b
     Monitor l a b -> two (Monitor l) n a b

@@ -18,6 +18,7 @@ import qualified Data.Set as Set
 import Semantics.Program
 import Semantics.Source
 import Semantics.State
+import Semantics.Verdict
 
 -- | The initial state of a world.
 initial :: World -> State
@@ -56,6 +57,10 @@ begin t p = case p of
   FirstOf [] -> Over (Failed noAlternative)
   FirstOf acts -> Waiting Race (numbered "firstOf: " acts)
   AllOf acts -> Waiting Gather (numbered "allOf: " acts)
+  Decide choice acts chosen -> case chosenBy choice (Nothing <$ acts) of
+    Just (Succeeded _) -> begin t chosen
+    Just wrong -> Over wrong
+    Nothing -> Waiting (Decision choice) (numbered "decide: " acts) `AndThen` chosen
   Scoped body -> Waiting Nursery [thread t "scoped: body" body]
   Fork act -> Forking act Nothing
   Await act meanwhile -> Forking act (Just (False, meanwhile))

@@ -73,8 +73,10 @@ within' inScope sharing = go
       , (2, Both <$> less <*> less)
       , (2, FirstOf <$> few less)
       , (2, AllOf <$> few less)
+      , (3, Decide <$> choices <*> few less <*> less)
       , (4, RSelect <$> sensed <*> less <*> less)
       , (5, Monitor <$> sensed <*> takingTime less <*> less)
+      , (3, InsteadWhen <$> sensed <*> less <*> less)
       , (2, Switch <$> sensed <*> few1 less)
       , (2, TeleoReactive <$> few ((,) <$> sensed <*> less))
       , (1, WaitUntil <$> sensed)
@@ -87,6 +89,7 @@ within' inScope sharing = go
    where
     less = frequency [(1, choose (0, n - 1)), (2, pure (n - 1))] >>= go
     sensed = signal (n - 1)
+    choices = frequency [(8, AtLeast <$> choose (0, 3)), (2, pure FirstEnd), (1, pure NoChoice)]
     few one = frequency [(1, pure 0), (4, pure 1), (10, choose (2, 3))] >>= \k -> vectorOf k one
     few1 one = choose (1, 3) >>= \k -> vectorOf k one
   signal n =

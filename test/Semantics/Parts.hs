@@ -26,8 +26,10 @@ parts = \case
   Both a b -> [a, b]
   FirstOf as -> as
   AllOf as -> as
+  Decide _ as b -> as ++ [b]
   RSelect s a b -> ofSignal s ++ [a, b]
   Monitor s a b -> ofSignal s ++ [a, b]
+  InsteadWhen s a b -> ofSignal s ++ [a, b]
   Switch s as -> ofSignal s ++ as
   TeleoReactive rules -> concat [ofSignal s ++ [a] | (s, a) <- rules]
   WaitUntil s -> ofSignal s
@@ -60,8 +62,10 @@ rebuild p new = case (p, new) of
   (Both _ _, [a, b]) -> Both a b
   (FirstOf _, as) -> FirstOf as
   (AllOf _, as) -> AllOf as
+  (Decide choice _ _, as@(_ : _)) -> Decide choice (init as) (last as)
   (RSelect s _ _, as) | (s', [a, b]) <- sensing s as -> RSelect s' a b
   (Monitor s _ _, as) | (s', [a, b]) <- sensing s as -> Monitor s' a b
+  (InsteadWhen s _ _, as) | (s', [a, b]) <- sensing s as -> InsteadWhen s' a b
   (Switch s _, as) | (s', bs) <- sensing s as -> Switch s' bs
   (TeleoReactive rules, as) -> TeleoReactive (ruled rules as)
   (WaitUntil s, as) -> WaitUntil (fst (sensing s as))
@@ -96,6 +100,7 @@ resignal :: (Signal -> [Signal]) -> Program -> [Program]
 resignal with = \case
   RSelect s a b -> [RSelect s' a b | s' <- with s]
   Monitor s a b -> [Monitor s' a b | s' <- with s]
+  InsteadWhen s a b -> [InsteadWhen s' a b | s' <- with s]
   Switch s as -> [Switch s' as | s' <- with s]
   TeleoReactive rules ->
     [ TeleoReactive (take n rules ++ [(s', a)] ++ drop (n + 1) rules)

@@ -7,6 +7,7 @@
 module Semantics.Program
   ( -- * Programs
     Program (..)
+  , Choice (..)
   , Signal (..)
   , Name
   , Label
@@ -41,6 +42,8 @@ module Semantics.Program
   , doesNotHold
   , tooLate
   , childStopped
+  , tooFew
+  , noneChosen
   , timedOut
   , overdueBy
   , cleanupOf
@@ -67,8 +70,11 @@ data Program
   | Both Program Program
   | FirstOf [Program]
   | AllOf [Program]
+  | -- | What is chosen runs the last program, or fails.
+    Decide Choice [Program] Program
   | RSelect Signal Program Program
   | Monitor Signal Program Program
+  | InsteadWhen Signal Program Program
   | -- | The number is the index of the branch, from zero; larger numbers select the last
     -- branch.
     Switch Signal [Program]
@@ -85,6 +91,16 @@ data Program
     Await Program Program
   | -- | Likewise, but requests the stop of the first before it waits.
     StopChild Program Program
+  deriving (Eq, Ord, Show)
+
+-- | How 'Decide' chooses.
+data Choice
+  = -- | When that many have succeeded. It fails when too few are left.
+    AtLeast Int
+  | -- | When the first has ended: it fails as that has, if it has.
+    FirstEnd
+  | -- | Never.
+    NoChoice
   deriving (Eq, Ord, Show)
 
 -- | A signal's value is a number; as a condition it 'holds' or not.
@@ -236,12 +252,14 @@ holds = (> 0)
 
 -- The library's own failures.
 
-noAlternative, noValue, doesNotHold, tooLate, childStopped :: String
+noAlternative, noValue, doesNotHold, tooLate, childStopped, tooFew, noneChosen :: String
 noAlternative = "Failed"
 noValue = "FailedBecause \"the signal has no value any more\""
 doesNotHold = "FailedBecause \"the condition does not hold\""
 tooLate = "FailedBecause \"fork: the nursery's scoped behaviour is ending\""
 childStopped = "ChildStopped"
+tooFew = "FailedBecause \"too few have succeeded\""
+noneChosen = "decide: all behaviours have ended, and the function has chosen none"
 
 timedOut :: Ticks -> String
 timedOut n = "TimedOut " ++ show n ++ ".0"

@@ -27,13 +27,13 @@ import Data.Foldable (for_)
 import Data.IORef
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
-import Data.Maybe (isJust)
+import Data.Maybe (catMaybes, isJust, isNothing)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
 import Behavior.Internal.Failure hiding (Failed (..))
 import Behavior.Internal.Nursery
-import Behavior.Internal.Parallel (allOf, both, firstOf, parallel)
+import Behavior.Internal.Parallel (allOf, both, decide, firstOf, parallel)
 import Behavior.Internal.Reactive.Operators
 import Behavior.Internal.Reactive.Timeout
 import Behavior.Internal.Runtime hiding (Event (..), Label)
@@ -170,8 +170,10 @@ toBehavior emit stage = go
     Both left right -> Unit <$ both (go left) (go right)
     FirstOf ps -> firstOf (map go ps)
     AllOf ps -> Several <$> allOf (map go ps)
+    Decide choice ps q -> decide (chosenFrom choice (go q)) (map go ps)
     RSelect signal left right -> rSelect (holds <$> level signal) (go left) (go right)
     Monitor signal recovery task -> monitor (holds <$> level signal) (void (go recovery)) (go task)
+    InsteadWhen signal emergency p -> insteadWhen (holds <$> level signal) (go emergency) (go p)
     Switch signal branches -> switch (level signal) (\n -> go (branches !! max 0 (min n (length branches - 1))))
     TeleoReactive rules -> teleoReactive [(holds <$> level signal, go p) | (signal, p) <- rules]
     WaitUntil signal -> Unit <$ waitUntil (holds <$> level signal)
@@ -199,6 +201,17 @@ toBehavior emit stage = go
         NoValue -> retry
         Failing -> throwSTM (Failure condition)
         Faulting -> throwSTM (Fault condition)
+
+-- | What 'Decide' runs, given these ends; if it has chosen.
+chosenFrom :: Choice -> Behavior a -> [Maybe (Either BehaviorFailed b)] -> Maybe (Behavior a)
+chosenFrom choice chosen ends' = case choice of
+  AtLeast m
+    | succeeded >= m -> Just chosen
+    | succeeded + length (filter isNothing ends') < m -> Just (failWith "too few have succeeded")
+  FirstEnd | end' : _ <- catMaybes ends' -> Just (either throwIO (const chosen) end')
+  _ -> Nothing
+ where
+  succeeded = length [() | Just (Right _) <- ends']
 
 -- | One call of an action.
 act :: (ActionEvent -> IO ()) -> Name -> Script -> Behavior Value

@@ -60,6 +60,7 @@ shrinkProgram p = parts p ++ outer ++ inner
     FallbackOver as -> FallbackOver <$> without as
     FirstOf as -> FirstOf <$> without as
     AllOf as -> AllOf <$> without as
+    Decide choice as b -> (\some -> Decide choice some b) <$> without as
     TeleoReactive rules -> TeleoReactive <$> without rules
     Attempt n a -> [Attempt (n - 1) a | n > 1]
     _ -> resignal shrinkSignal p

@@ -38,6 +38,7 @@ signals :: Program -> [Signal]
 signals = \case
   RSelect s _ _ -> [s]
   Monitor s _ _ -> [s]
+  InsteadWhen s _ _ -> [s]
   Switch s _ -> [s]
   TeleoReactive rules -> map fst rules
   WaitUntil s -> [s]

@@ -114,6 +114,7 @@ data Running
 data Operator
   = Race
   | Gather
+  | Decision Choice
   | Nursery
   | Share
   | React

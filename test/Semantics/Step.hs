@@ -334,10 +334,10 @@ reactions t p source v phase = case phase of
     (RunToEnd recovery, _) -> recover (Just branch) source recovery
     (_, Stopped _) -> Reacting p source (viewOf t source) (Choosing Reread)
     _ -> conclude React result source [branch]
-  recover before source' recovery = Reacting p source' v (Recovering before (thread t "monitor: recovery" recovery))
+  recover before source' recovery = Reacting p source' v (Recovering before (thread t (recoveryOf p) recovery))
   recovered before result recovery = case (before >>= endOf, result) of
     (Just wrong, _) -> conclude React wrong source (maybe id (:) before [recovery])
-    (_, Succeeded _) -> afterSensorStep t p source v AwaitingSensors
+    (_, Succeeded _) | Monitor {} <- p -> afterSensorStep t p source v AwaitingSensors
     _ -> conclude React result source [recovery]
 
 -- | The operator after a step of its sensors.

@@ -3,6 +3,7 @@
 module Semantics.Verdict
   ( -- * Verdicts on branches
     verdict
+  , chosenBy
   , conclude
   , concluding
   , outcome
@@ -11,10 +12,11 @@ module Semantics.Verdict
   , valueOf
   , reaction
   , nameOf
+  , recoveryOf
   ) where
 
 import Data.List (find)
-import Data.Maybe (mapMaybe)
+import Data.Maybe (catMaybes, mapMaybe)
 
 import Semantics.Program
 import Semantics.Source
@@ -32,6 +34,12 @@ verdict operator threads = case operator of
   Gather
     | all completed threads -> Just (Succeeded (Several [value | Succeeded value <- ends']))
     | otherwise -> firstOf wrongs
+  -- A fault; or the choice.
+  Decision choice
+    | Just fault <- firstOf [result | result@(Faulted _) <- ends'] -> Just fault
+    | Just chosen <- chosenBy choice (map endOf threads) -> Just chosen
+    | all over threads -> Just (Faulted noneChosen)
+    | otherwise -> Nothing
   -- The body, however it ends; or a child that fails or faults (not one that stops).
   Nursery -> case threads of
     body : _ | over body -> endOf body
@@ -41,6 +49,19 @@ verdict operator threads = case operator of
   ends' = mapMaybe endOf threads
   wrongs = mapMaybe endOf (filter (not . completed) threads)
   firstOf = find (const True)
+
+-- | Whether, given these ends, 'Decide' runs its last program, or fails; if it has chosen.
+chosenBy :: Choice -> [Maybe Result] -> Maybe Result
+chosenBy choice ends' = case choice of
+  AtLeast m
+    | succeeded >= m -> Just (Succeeded Unit)
+    | succeeded + length (filter (== Nothing) ends') < m -> Just (Failed tooFew)
+  FirstEnd | result : _ <- catMaybes ends' -> Just $ case result of
+    Succeeded _ -> Succeeded Unit
+    wrong -> wrong
+  _ -> Nothing
+ where
+  succeeded = length [() | Just (Succeeded _) <- ends']
 
 -- | With a verdict, an operator requests the stop of all that still runs, at once.
 conclude :: Operator -> Result -> Source -> [Thread] -> Running
@@ -87,6 +108,7 @@ reaction :: Program -> Int -> Reaction
 reaction p value = case p of
   RSelect _ left right -> Run (if isTrue then left else right)
   Monitor _ recovery task -> if isTrue then RunToEnd recovery else Run task
+  InsteadWhen _ emergency act -> if isTrue then RunToEnd emergency else Run act
   Switch _ branches -> Run (branches !! max 0 (min value (length branches - 1)))
   TeleoReactive rules -> if value < 0 then Idle else Run (snd (rules !! value))
   WaitUntil _ -> if isTrue then Conclude (Succeeded Unit) else Idle
@@ -101,7 +123,14 @@ nameOf :: Program -> Int -> Label
 nameOf p value = case p of
   RSelect {} -> if holds value then "rSelect: left" else "rSelect: right"
   Monitor {} -> "monitor: task"
+  InsteadWhen {} -> "insteadWhen: branch"
   Switch {} -> "switch: branch"
   TeleoReactive _ -> "teleoReactive: rule " ++ show (value + 1)
   WhileHolding {} -> "whileHolding: branch"
   _ -> "timeout: branch"
+
+-- | The name of the branch that runs to its end.
+recoveryOf :: Program -> Label
+recoveryOf p = case p of
+  InsteadWhen {} -> "insteadWhen: emergency"
+  _ -> "monitor: recovery"

@@ -14,15 +14,18 @@ module Behavior.Internal.Parallel
     -- * Any number
   , firstOf
   , allOf
+  , decide
   ) where
 
-import Control.Concurrent.STM (retry)
-import Control.Exception (throwIO)
-import Control.Monad (foldM, void, (<=<), (<$!>))
+import Control.Concurrent.STM (STM, TVar, catchSTM, check, modifyTVar', newTVarIO, readTVar, retry)
+import Control.Exception (ErrorCall (..), SomeException, evaluate, fromException, throwIO)
+import Control.Monad (foldM, join, void, (<=<), (<$!>))
 import Data.Foldable (toList)
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
 import Data.Traversable (mapAccumL)
 
-import Behavior.Internal.Failure (Behavior, failed)
+import Behavior.Internal.Failure (Behavior, BehaviorFailed, failed)
 import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
@@ -149,6 +152,91 @@ allOf behaviors = structured $ \scope -> do
               _ -> Just <$> readLeftmost failure
         maybe (awaitAll bs) (pure . throwIO) failing
   awaitAll branches
+
+-- | Starts all behaviours at once, and runs the behaviour that a function of their ends chooses.
+--
+-- > firstOf  =  decide (\ends -> listToMaybe [either throwIO pure end | Just end <- ends])
+--
+-- The function is given the ends so far, by position: 'Nothing' while a behaviour runs, then its
+-- failure or its result. As soon as it chooses, the others are stopped; when they have ended, the
+-- chosen behaviour runs. It is asked before the start (what is certain then starts nothing), and
+-- after each end; several ends may have come together. It runs in a transaction, and perhaps more
+-- often than necessary.
+--
+-- [Result] That of the chosen behaviour.
+-- [Failure] That of the chosen behaviour. A behaviour's own failure is only passed to the function.
+-- [Fault] The leftmost fault of all, in a cleanup too, is always thrown; then nothing chosen runs.
+--   What the function throws is thrown. When all have ended and it has still not chosen, that
+--   is a fault too.
+-- [Cancellation] Requests the stop of all together; returns after all have ended. The chosen
+--   behaviour runs in the caller's thread.
+--
+-- The first that succeeds; if none does, it fails as the last one:
+--
+-- >>> import Control.Exception (throwIO)
+-- >>> :{
+-- firstToSucceed :: [Behavior a] -> Behavior a
+-- firstToSucceed = decide $ \ends -> case ([a | Just (Right a) <- ends], sequence ends) of
+--   (a : _, _) -> Just (pure a)
+--   ([], Just failures) -> Just (last (failed : [throwIO e | Left e <- failures]))
+--   _ -> Nothing
+-- :}
+--
+-- >>> firstToSucceed [failWith "no satellite", sleep 0.01 >> pure "wheel encoders"]
+-- "wheel encoders"
+--
+-- Two of three, or any m of n; it fails as soon as too few are left:
+--
+-- >>> :{
+-- atLeast :: Int -> [Behavior a] -> Behavior [a]
+-- atLeast m = decide $ \ends ->
+--   let results = take m [a | Just (Right a) <- ends]
+--       left = length [() | Nothing <- ends]
+--    in if length results == m then Just (pure results)
+--       else if length results + left < m then Just (failWith "too few have succeeded")
+--       else Nothing
+-- :}
+--
+-- >>> atLeast 2 [pure 1.5, failWith "out of range", pure 1.6]
+-- [1.5,1.6]
+--
+-- >>> atLeast 2 [failWith "out of range", sleep 3600, failWith "no echo"]
+-- *** Exception: FailedBecause "too few have succeeded"
+--
+-- /Section 2 of the paper: the Parallel node with its thresholds for success and failure./
+--
+-- @since 0.1.0.0
+decide :: ([Maybe (Either BehaviorFailed a)] -> Maybe (Behavior b)) -> [Behavior a] -> Behavior b
+decide choose behaviors =
+  evaluate (choose (Nothing <$ behaviors)) >>= \case
+    Just chosen -> chosen
+    Nothing -> join . structured $ \scope -> do
+      ends <- newTVarIO (Right IntMap.empty)
+      void $ startAll (\n -> branchWithHook (addEnd ends n) scope (Label "decide" (show n))) behaviors
+      chooseAfter ends 0
+ where
+  -- What the function throws is caught where it runs: what is thrown in the operator's thread
+  -- would be taken for an exception from outside.
+  chooseAfter ends seen = join . atomically $
+    readTVar ends >>= \case
+      Left fault -> pure (pure (throwIO fault))
+      Right known -> do
+        check (IntMap.size known > seen || count == 0)
+        (chosenOf ends known <$> (pure $! choose (inOrder known))) `catchSTM` \e -> pure (pure (throwIO (e :: SomeException)))
+  chosenOf ends known = \case
+    Just chosen -> pure (pure chosen)
+    Nothing
+      | IntMap.size known == count -> pure (throwIO (ErrorCall "decide: all behaviours have ended, and the function has chosen none"))
+      | otherwise -> chooseAfter ends (IntMap.size known)
+  inOrder known = [IntMap.lookup n known | n <- [1 .. count]]
+  count = length behaviors
+
+-- | Adds how a branch has ended: its failure or result, or a fault in place of all of them.
+addEnd :: TVar (Either SomeException (IntMap (Either BehaviorFailed a))) -> Int -> Outcome a -> STM ()
+addEnd ends n end = modifyTVar' ends $ case (end, result end) of
+  (_, Right a) -> (IntMap.insert n (Right a) <$!>)
+  (Failing _, Left e) | Just failure <- fromException e -> (IntMap.insert n (Left failure) <$!>)
+  (_, Left e) -> (>> Left e)
 
 -- | The container with its elements replaced by those of the list, which has as many.
 refilled :: Traversable t => t x -> [a] -> t a

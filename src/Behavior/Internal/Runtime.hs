@@ -334,14 +334,27 @@ sleep seconds = do
   _ <- duration "sleep" seconds
   when (seconds > 0) $ now >>= \t -> sleepBetween t (t + seconds)
 
--- | Sleeps until the given moment.
+-- | Sleeps until a point in time on the clock of 'now'; returns at once if that has passed.
+--
+-- > sleep s  =  now >>= \t -> sleepUntil (t + s)
+--
+-- With an infinite number it sleeps until it is cancelled. NaN is refused with an 'ErrorCall' (a
+-- fault). A deadline for a mission, if @t@ is its time:
+--
+-- > now >>= \started -> timeout (max 0 (t - started)) mission
+--
+-- >>> started <- now
+-- >>> sleepUntil (started + 0.001)
+--
+-- @since 0.1.0.0
 sleepUntil :: Seconds -> IO ()
-sleepUntil moment@(Seconds time) =
-  inSimulation (getMonotonicTime >>= \t -> Timer.sleepBetween t time) (`await` moment)
+sleepUntil seconds = do
+  end@(Seconds time) <- moment "sleepUntil" seconds
+  inSimulation (getMonotonicTime >>= \t -> Timer.sleepBetween t time) (`await` end)
 
 -- | Sleeps until the second moment. The first is the current time.
 sleepBetween :: Seconds -> Seconds -> IO ()
-sleepBetween (Seconds t) moment@(Seconds time) = inSimulation (Timer.sleepBetween t time) (`await` moment)
+sleepBetween (Seconds t) end@(Seconds time) = inSimulation (Timer.sleepBetween t time) (`await` end)
 
 -- | Sleeps until a slot begins, and gives the time when it begins. The arguments are the
 -- period, the current time, and when the slot should begin (in reality it may begin a little

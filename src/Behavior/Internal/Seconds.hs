@@ -11,6 +11,10 @@ module Behavior.Internal.Seconds
     -- * What is allowed
   , duration
   , period
+  , moment
+
+    -- * Slots
+  , slotAfter
   ) where
 
 import Control.Exception (ErrorCall (..), throwIO)
@@ -44,6 +48,19 @@ period :: String -> Seconds -> IO Seconds
 period operator seconds
   | seconds >= 0.000001 = pure seconds
   | otherwise = refuse operator "a period is at least 0.000001 seconds" seconds
+
+-- | Refuses what is no point in time: NaN.
+moment :: String -> Seconds -> IO Seconds
+moment operator seconds
+  | seconds == seconds = pure seconds
+  | otherwise = refuse operator "a point in time is a number" seconds
+
+-- | That slot; or if it has been missed, the next that has not. The arguments are the period, the
+-- current time, and the slot.
+slotAfter :: Seconds -> Seconds -> Seconds -> Seconds
+slotAfter interval t slot
+  | slot >= t = slot
+  | otherwise = slot + interval * fromInteger (ceiling ((t - slot) / interval))
 
 refuse :: String -> String -> Seconds -> IO a
 refuse operator allowed seconds =

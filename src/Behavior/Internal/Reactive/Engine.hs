@@ -8,6 +8,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Reactive.Engine
   ( Reaction (..)
+  , Next (..)
   , react
   ) where
 
@@ -24,12 +25,15 @@ import Behavior.Internal.Signal.Source
 data Reaction a
   = -- | Run this branch (with its name) until it ends or the value changes.
     Run String (Behavior a)
-  | -- | Run this branch to its end, without watching the signal, then begin again.
-    RunToEnd String (Behavior ())
+  | -- | Run this branch to its end, without watching the signal.
+    RunToEnd String (Behavior (Next a))
   | -- | Wait for another value.
     Idle
   | -- | End the operator.
     Conclude (IO a)
+
+-- | What follows a branch that has run to its end.
+data Next a = BeginAgain | EndWith a
 
 -- | The parts of a running operator that do not change.
 data Engine k a = Engine
@@ -48,7 +52,7 @@ data Wakeup k a
 -- | Why a branch is stopped: what the operator does after the branch has ended.
 data Interruption a
   = Reselect
-  | Recover String (Behavior ())
+  | Recover String (Behavior (Next a))
   | Finish (IO a)
 
 -- | Runs the reaction to the signal's value, and changes to another reaction when the value
@@ -134,14 +138,15 @@ interrupt engine sensors running = \case
 
 -- | Runs the recovery to its end. The sensors' stop has been requested: the recovery does not
 -- wait for those that are slow to stop, but what comes after it does.
-recover :: Eq k => Engine k a -> Sensors -> String -> Behavior () -> Maybe (IO a) -> IO (IO a)
+recover :: Eq k => Engine k a -> Sensors -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (IO a)
 recover engine sensors name recovery taskOutcome = do
   recovered <- branch (scope engine) (Label (operator engine) name) recovery
   end <- awaitOutcome recovered
   case (result end, taskOutcome) of
     (_, Just verdict) -> pure verdict
     (Left wrong, Nothing) -> pure (throwIO wrong)
-    (Right (), Nothing) -> do
+    (Right (EndWith a), Nothing) -> pure (pure a)
+    (Right BeginAgain, Nothing) -> do
       forget (scope engine) recovered
       faults <- catMaybes <$> traverse (awaitStopped (scope engine)) sensors
       case faults of

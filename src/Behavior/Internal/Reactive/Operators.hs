@@ -9,6 +9,7 @@ module Behavior.Internal.Reactive.Operators
   ( -- * Interrupting
     rSelect
   , monitor
+  , insteadWhen
 
     -- * Many branches
   , switch
@@ -95,8 +96,41 @@ rSelect condition left right = react "rSelect" condition $ \case
 -- @since 0.1.0.0
 monitor :: Signal Bool -> Behavior () -> Behavior a -> Behavior a
 monitor condition recovery task = react "monitor" condition $ \case
-  True -> RunToEnd "recovery" recovery
+  True -> RunToEnd "recovery" (BeginAgain <$ recovery)
   False -> Run "task" task
+
+-- | Runs @act@; when the condition becomes true, stops it, and runs @emergency@ in its place: once,
+-- to completion, and with no way back.
+--
+-- > insteadWhen (pure False) emergency act  =  act
+-- > insteadWhen (pure True)  emergency act  =  emergency
+--
+-- The condition is read before anything starts. When it is true, that is latched: @act@ is stopped,
+-- and when it has ended, cleanup included, @emergency@ runs, and the condition is not watched any
+-- more. (With @whileHolding (not \<$> condition) act ? emergency@ a failure of @act@ would start
+-- the emergency too, and a fault in its cleanup would prevent it.)
+--
+-- [Result] That of @act@, also if it completed although its stop was requested (then the emergency
+--   does not run), or of @emergency@.
+-- [Failure] Of @act@ or @emergency@: ends the operator with it. If @act@ fails /while it is being
+--   stopped/, the emergency runs first, and then that failure is thrown. A condition that fails, or
+--   that no longer has a value, is not \"false\": @act@ is stopped and the operator fails.
+-- [Fault] Likewise.
+-- [Cancellation] Only the caller can interrupt the emergency. Requests the stop of everything
+--   together; returns after everything has ended.
+--
+-- >>> import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+-- >>> windy <- newTVarIO False
+-- >>> let survey = putStrLn "survey" >> atomically (writeTVar windy True) >> sleep 3600
+-- >>> Signal.insteadWhen (Signal.watching (readTVar windy)) (putStrLn "land") survey
+-- survey
+-- land
+--
+-- @since 0.1.0.0
+insteadWhen :: Signal Bool -> Behavior a -> Behavior a -> Behavior a
+insteadWhen condition emergency act = react "insteadWhen" condition $ \case
+  True -> RunToEnd "emergency" (EndWith <$> emergency)
+  False -> Run "branch" act
 
 -- | 'rSelect' with a branch for each value of any type.
 --

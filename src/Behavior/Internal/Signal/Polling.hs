@@ -17,7 +17,7 @@ import Data.IORef (newIORef, readIORef, writeIORef)
 
 import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
 import Behavior.Internal.Runtime
-import Behavior.Internal.Seconds (period)
+import Behavior.Internal.Seconds (period, slotAfter)
 import Behavior.Internal.Signal.Source
 
 -- $setup
@@ -84,15 +84,11 @@ polling every act = Signal $ \demand -> do
             when (changed || readingTimes demand) . atomically $ do
               when changed (writeTVar newest (Just (generation, read')))
               when (readingTimes demand) (writeTVar inFlight Nothing)
-            now >>= \t' -> readFrom t' (slotAfter t' (slot + every)) $! case read' of
+            now >>= \t' -> readFrom t' (slotAfter every t' (slot + every)) $! case read' of
               _ | not changed -> published
               Left _ -> Unpublished
               Right new -> Published generation new
       differs old new = either (const True) not <$> trySynchronous (evaluate (equalFor demand old new))
-      -- The slot, or the next one if that slot has been missed.
-      slotAfter t slot
-        | slot >= t = slot
-        | otherwise = slot + every * fromInteger (ceiling ((t - slot) / every))
   pure
     Source
       { workers = [Worker "polling" (readings <$ when (readingTimes demand) (writeTVar inFlight Nothing))]
