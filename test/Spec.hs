@@ -21,6 +21,7 @@ import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
 import qualified Behavior.FilterSpec
 import qualified Behavior.RepeatingSpec
+import qualified Behavior.ResumableSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
 import qualified Behavior.STMSpec
@@ -75,7 +76,9 @@ main = hspec $ do
     Behavior.TimeSpec.spec
     Behavior.RepeatingSpec.spec
     Behavior.TimerWheelSpec.spec
-  describe "STM" Behavior.STMSpec.spec
+  describe "STM" $ do
+    Behavior.STMSpec.spec
+    describe "resumable" Behavior.ResumableSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
   describe "From outside" $ do

@@ -1,7 +1,8 @@
 {-# LANGUAGE CPP #-}
 
 -- |
--- Transactional variables: all of the package stm, with this library's 'atomically'.
+-- Transactional variables: all of the package stm, with this library's 'atomically'; and 'resumable',
+-- which keeps its place in one.
 --
 -- Import this module in place of "Control.Concurrent.STM": it exports everything of that except
 -- @registerDelay@, whose time cannot be simulated ('Behavior.Time.sleep' and
@@ -15,6 +16,7 @@
 -- blocks.
 module Behavior.STM
   ( atomically
+  , resumable
 #ifndef __HADDOCK_VERSION__
     -- Haddock would list the whole package here.
   , module Control.Concurrent.STM
@@ -23,6 +25,7 @@ module Behavior.STM
 
 import Control.Concurrent.STM hiding (atomically, registerDelay)
 
+import Behavior.Internal.Resumable (resumable)
 import Behavior.Internal.Runtime (atomically)
 
 -- $setup

@@ -1,0 +1,103 @@
+-- |
+-- 'resumable': it goes on where it was, and repeats nothing that has returned.
+module Behavior.ResumableSpec (spec) where
+
+import Control.Concurrent (yield)
+import Control.Exception
+import Control.Monad (replicateM_, void, when)
+import Data.Foldable (for_)
+import Data.IORef
+import Data.List (group, nub)
+import Test.Hspec
+import Test.Hspec.QuickCheck (prop)
+
+import Behavior
+import qualified Behavior.Signal as Signal
+import Behavior.STM
+import Behavior.Sim (Plan, exhaustively, explore, randomly)
+import Memory (inConstantMemory)
+import Support hiding (Log)
+
+spec :: Spec
+spec = guarded $ do
+  prop "without an interruption runs the behaviour for each element, in order, and leaves none" $ \scripts ->
+    sameAs (\entries -> newTVarIO scripts >>= \left -> resumable left (void . play entries)) (\entries -> for_ scripts (play entries))
+
+  it "stays at the element for which the behaviour failed, faulted, or was cancelled" $ do
+    left <- newTVarIO "abc"
+    let stopAt c how x = when (x == c) how
+    ending (resumable left (stopAt 'b' failed)) `shouldReturn` FailedWith "Failed"
+    readTVarIO left `shouldReturn` "bc"
+    ending (resumable left (stopAt 'b' (throwIO (Fault "arm")))) `shouldReturn` FaultedWith (show (Fault "arm"))
+    readTVarIO left `shouldReturn` "bc"
+    entered <- newGate
+    cancelling (resumable left (stopAt 'c' (open entered >> hang))) (pass entered) `shouldReturn` CancelledBy (show (Cancel "the caller"))
+    readTVarIO left `shouldReturn` "c"
+
+  it "runs the behaviour in the caller's masking state" $
+    for_ [id, mask_, uninterruptibleMask_] $ \inState -> do
+      seen <- newIORef []
+      here <- inState $ do
+        left <- newTVarIO [(), ()]
+        resumable left (\() -> getMaskingState >>= \state -> modifyIORef' seen (state :))
+        getMaskingState
+      readIORef seen `shouldReturn` [here, here]
+
+  it "goes on to what was added meanwhile" $ do
+    entries <- newLog
+    left <- newTVarIO "a"
+    resumable left $ \c -> note entries c >> when (c == 'a') (atomically (modifyTVar' left (++ "b")))
+    notes entries `shouldReturn` "ab"
+
+  describe "A patrol that is interrupted" $ do
+    it "visits each place once, under all schedules" $
+      visitedTwice (exhaustively 2) resumable `shouldReturn` False
+    it "visits each place once, under random schedules" $
+      visitedTwice (randomly 500) resumable `shouldReturn` False
+    it "visits one twice if its place is stored when an interruption can come in between" $
+      visitedTwice (exhaustively 1) storedLater `shouldReturn` True
+
+  it "on real threads, masked, runs the behaviour once for each element, however often it is interrupted" $ do
+    done <- newIORef []
+    left <- newTVarIO [1 .. 300 :: Int]
+    -- Masked, so that the behaviour can be interrupted only while it waits.
+    let visit n = do
+          ready <- newTVarIO False
+          atomically (readTVar ready >>= check) ||| (yield >> atomically (writeTVar ready True))
+          modifyIORef' done (n :)
+        again = do
+          replicateM_ 50 yield
+          over <- null <$> readTVarIO left
+          if over then pure () else void (mask_ (resumable left visit) ||| replicateM_ 20 yield) >> again
+    again
+    visited <- reverse <$> readIORef done
+    map head (group visited) `shouldBe` nub visited
+    visited `shouldBe` [1 .. 300]
+
+  it "a hundred thousand elements, in constant memory" $
+    inConstantMemory 100000 $ \step -> do
+      left <- newTVarIO [1 .. 100000 :: Int]
+      resumable left (const step)
+
+-- | Whether, in one of the schedules, a patrol whose battery becomes low twice has visited a place
+-- twice.
+visitedTwice :: Plan -> (TVar [Int] -> (Int -> Behavior ()) -> Behavior ()) -> IO Bool
+visitedTwice plan resuming = do
+  found <- newIORef False
+  _ <- explore plan $ \simulate' -> do
+    left <- newTVarIO [1, 2, 3]
+    low <- newTVarIO False
+    visited <- newIORef []
+    let visit n = sleep 1 >> modifyIORef' visited (n :)
+        recharge = atomically (writeTVar low False)
+        drains = for_ [2, 4 :: Seconds] $ \_ -> sleep 2 >> atomically (writeTVar low True)
+    _ <- simulate' (Signal.monitor (Signal.watching (readTVar low)) recharge (resuming left visit) ||| (drains >> hang))
+    places <- readIORef visited
+    when (length places > length (nub places)) $ writeIORef found True
+  readIORef found
+
+-- | The mistake that 'resumable' does not make.
+storedLater :: TVar [a] -> (a -> Behavior ()) -> Behavior ()
+storedLater left act = do
+  now' <- readTVarIO left
+  for_ now' $ \x -> act x >> atomically (modifyTVar' left (drop 1))
