@@ -84,9 +84,10 @@
 -- interrupt a blocking operation in it ('sleep', a transaction that retries), if the
 -- behaviour had ended by itself and was already cleaning up when its stop was requested. The
 -- rest of the cleanup is then skipped, and the recovery starts. Make a cleanup that must be
--- finished uninterruptible; the operator that stops it waits for it:
+-- finished uninterruptible, or better, give it a limit ('Behavior.Time.cleanupWithin'); the operator
+-- that stops it waits for it:
 --
--- > (extend arm >> takePicture) `finally` uninterruptibleMask_ (park arm)
+-- > (extend arm >> takePicture) `finally` cleanupWithin 3 (park arm)
 --
 -- == What GHC limits
 --

@@ -8,6 +8,7 @@ import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
 import qualified Behavior.InsteadWhenSpec
 import qualified Behavior.MonitorSpec
+import qualified Behavior.CleanupSpec
 import qualified Behavior.DecideSpec
 import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.OperatorsSpec
@@ -74,6 +75,7 @@ main = hspec $ do
   describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
   describe "Time" $ do
     Behavior.TimeSpec.spec
+    Behavior.CleanupSpec.spec
     Behavior.RepeatingSpec.spec
     Behavior.TimerWheelSpec.spec
   describe "STM" $ do

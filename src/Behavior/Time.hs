@@ -24,6 +24,7 @@ module Behavior.Time
     -- * Limits
   , timeout
   , TimedOut (..)
+  , cleanupWithin
   ) where
 
 import Behavior.Internal.Reactive.Timeout

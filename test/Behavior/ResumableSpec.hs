@@ -21,7 +21,7 @@ import Support hiding (Log)
 spec :: Spec
 spec = guarded $ do
   prop "without an interruption runs the behaviour for each element, in order, and leaves none" $ \scripts ->
-    sameAs (\entries -> newTVarIO scripts >>= \left -> resumable left (void . play entries)) (\entries -> for_ scripts (play entries))
+    sameAs (\entries -> newTVarIO scripts >>= \left -> resumable left (void . play entries)) (for_ scripts . play)
 
   it "stays at the element for which the behaviour failed, faulted, or was cancelled" $ do
     left <- newTVarIO "abc"

@@ -8,10 +8,11 @@
 module Behavior.Internal.Reactive.Timeout
   ( timeout
   , TimedOut (..)
+  , cleanupWithin
   ) where
 
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
-import Control.Exception (Exception (..), throwIO)
+import Control.Exception (Exception (..), throwIO, uninterruptibleMask_)
 
 import Behavior.Internal.Failure
   ( Behavior
@@ -25,6 +26,7 @@ import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), c
 
 -- $setup
 -- >>> import Behavior (sleep, (?))
+-- >>> import Control.Exception (onException)
 
 -- | Runs the behaviour for at most the given number of seconds, and fails with 'TimedOut'
 -- when it takes longer.
@@ -65,6 +67,38 @@ instance Exception TimedOut where
   toException = behaviorFailedToException
   fromException = behaviorFailedFromException
   displayException (TimedOut limit) = "timed out after " ++ show limit ++ " s"
+
+-- | A cleanup that takes time: runs it to its end, however often the caller is cancelled meanwhile,
+-- but for at most the given number of seconds.
+--
+-- > cleanupWithin s act  =  uninterruptibleMask_ (Just <$> timeout s act)
+-- >   -- but with Nothing in place of TimedOut
+--
+-- Use it in an exception handler: @drive \`onException\` cleanupWithin 3 park@. In 'onException' and
+-- 'Control.Exception.finally' a plain @park@ would be stopped by a second cancellation, and with
+-- 'uninterruptibleMask_' nothing could stop it. Here it runs in a branch, unmasked, whatever the
+-- caller's masking state. When the time is up its stop is requested; then it is still awaited.
+--
+-- [Result] The behaviour's; 'Nothing' when its time was up and it has stopped. So the exception that
+--   it is a cleanup for goes on.
+-- [Failure, fault] Of the behaviour: thrown.
+-- [Cancellation] Stays pending until it has ended.
+--
+-- With zero seconds, the behaviour is not started. A negative number or NaN is
+-- refused with an 'Control.Exception.ErrorCall' (a fault). As with every caller that is masked
+-- uninterruptibly, a behaviour that throws to its caller ('Control.Exception.throwTo') deadlocks.
+--
+-- >>> timeout 0.01 (sleep 3600 `onException` cleanupWithin 0.01 (putStrLn "park" >> sleep 3600)) ? putStrLn "go on"
+-- park
+-- go on
+--
+-- @since 0.1.0.0
+cleanupWithin :: Seconds -> Behavior a -> Behavior (Maybe a)
+cleanupWithin seconds behavior = uninterruptibleMask_ $ do
+  limit <- duration "cleanupWithin" seconds
+  react "cleanupWithin" (elapsed limit) $ \case
+    True -> Conclude (pure Nothing)
+    False -> Run "branch" (Just <$> behavior)
 
 -- | False until the given number of seconds has passed since the signal was opened.
 elapsed :: Seconds -> Signal Bool
