@@ -7,6 +7,7 @@ import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
 import qualified Behavior.InsteadWhenSpec
+import qualified Behavior.MessageSpec
 import qualified Behavior.MonitorSpec
 import qualified Behavior.CleanupSpec
 import qualified Behavior.DecideSpec
@@ -81,6 +82,7 @@ main = hspec $ do
   describe "STM" $ do
     Behavior.STMSpec.spec
     describe "resumable" Behavior.ResumableSpec.spec
+  describe "Messages" Behavior.MessageSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
   describe "From outside" $ do

@@ -17,6 +17,7 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Internal.Runtime (atomically)
+import Behavior.Message (onMessage, withInbox)
 import Behavior.Parallel (allOf, decide, firstOf, scoped)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
@@ -48,9 +49,14 @@ operators =
   , ("rSelect", \act -> Signal.rSelect (pure True) act (pure ""))
   , ("monitor", Signal.monitor (pure False) (pure ()))
   , ("monitor (its recovery)", \act -> Signal.monitor (pure True) (void act) (pure ""))
+  , ("onMessage", \act -> withInbox 1 silent (\inbox -> onMessage inbox (\() -> hang) act))
+  , ("onMessage (its handler)", \act -> withInbox 1 speaking (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure "")))
   , ("rSelect, polled", \act -> rSelect (pure True) act (pure ""))
   , ("monitor, polled", monitor (pure False) (pure ()))
   ]
+ where
+  silent _ = pure (pure ())
+  speaking deliver = pure () <$ deliver ()
 
 -- | What a branch does when it is stopped.
 data Stopping = Stops | Completes | Fails | Faults
