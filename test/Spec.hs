@@ -19,6 +19,7 @@ import qualified Behavior.PinnedSpec
 import qualified Behavior.PolledSpec
 import qualified Behavior.PollingSpec
 import qualified Behavior.PromisesSpec
+import qualified Behavior.RateSpec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
 import qualified Behavior.FilterSpec
@@ -68,6 +69,7 @@ main = hspec $ do
     Behavior.BadReadingSpec.spec
     Behavior.EqualitySuppressionSpec.spec
     Behavior.FilterSpec.spec
+    Behavior.RateSpec.spec
     Behavior.OperatorsSpec.spec
     Behavior.OutcomeSpec.spec
     Behavior.ReactiveSpec.spec
