@@ -20,7 +20,7 @@ import Behavior.Internal.Runtime (Label (..))
 import Behavior.Message (handleNext, onMessage, withInbox)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, timeout)
+import Behavior.Time (abandoning, atomically, timeout)
 import Support
 
 -- | A place in an operator. All other branches of the operator do nothing: when the
@@ -68,6 +68,7 @@ places =
   , inThread "pinned" "body" pinned
   , inThread "unpinned" "body" unpinned
   , inThread "timeout" "branch" (timeout 3600)
+  , inThread "abandoning" "branch" (abandoning 3600)
   , inThread "rSelect" "left" (\act -> Signal.rSelect (pure True) act hang)
   , inThread "rSelect" "right" (\act -> rSelect (pure False) hang act)
   , inThread "monitor" "task" (monitor (pure False) hang)

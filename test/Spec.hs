@@ -3,6 +3,7 @@ module Main (main) where
 import Test.Hspec
 
 import qualified Behavior.TimerWheelSpec
+import qualified Behavior.AbandoningSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
@@ -79,6 +80,7 @@ main = hspec $ do
   describe "Time" $ do
     Behavior.TimeSpec.spec
     Behavior.CleanupSpec.spec
+    Behavior.AbandoningSpec.spec
     Behavior.RepeatingSpec.spec
     Behavior.TimerWheelSpec.spec
   describe "STM" $ do

@@ -21,7 +21,7 @@ import Behavior.Message (onMessage, withInbox)
 import Behavior.Parallel (allOf, decide, firstOf, scoped)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior.Time (abandoning, timeout)
 import Support hiding (End (..))
 
 spec :: Spec
@@ -41,6 +41,7 @@ operators =
   , ("scoped", scoped . const)
   , ("withShared", Signal.withShared (pure True) . const)
   , ("timeout", timeout 3600)
+  , ("abandoning", abandoning 3600)
   , ("whileHolding", Signal.whileHolding (pure True))
   , ("switch", Signal.switch (pure 'k') . const)
   , ("teleoReactive", \act -> Signal.teleoReactive [(pure True, act)])
