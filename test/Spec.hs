@@ -39,6 +39,7 @@ import qualified Examples.DoorBatterySpec
 import qualified Examples.GreenhouseRoverSpec
 import qualified Examples.ProgressProblemSpec
 import qualified Examples.TestingARobotSpec
+import qualified Examples.YourOwnMonadSpec
 import qualified Paper.DoorsSpec
 import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
@@ -120,3 +121,4 @@ main = hspec $ do
     describe "greenhouse-rover" Examples.GreenhouseRoverSpec.spec
     describe "progress-problem" Examples.ProgressProblemSpec.spec
     describe "testing-a-robot" Examples.TestingARobotSpec.spec
+    describe "your own monad" Examples.YourOwnMonadSpec.spec

@@ -107,8 +107,11 @@ spec = guarded . describe "abandoning" $ do
     notes entries `shouldReturn` []
 
   describe "A drone whose camera hangs while the wind rises" $ do
-    it "lands in time if it abandons the camera" $
+    it "lands in time if it abandons the camera; the end of the simulation ends that, too" $ do
       landedAt (abandoning 2) `shouldReturn` Just 11
+      abandonedCount `shouldReturn` 0
+      _ <- simulate (timeout 1 (abandoning 2 (uninterruptibleMask_ (sleep 1000))) ? pure ())
+      abandonedCount `shouldReturn` 0
     it "does not land if it awaits the camera" $
       landedAt id `shouldReturn` Nothing
 

@@ -11,7 +11,7 @@ module Behavior.Internal.Abandoning
   , Abandoned (..)
   ) where
 
-import Control.Exception (Exception (..), SomeException, finally, onException)
+import Control.Exception (Exception (..), SomeException, onException)
 import Control.Monad (unless, void)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
 import System.IO.Unsafe (unsafePerformIO)
@@ -74,7 +74,8 @@ stopWithin limit scope acting = do
   unless ended $ do
     forget scope acting
     count 1
-    void (start (Label "abandoning" "watcher") (watch `finally` count (-1)))
+    -- (It is counted off even if the end of a simulation comes before the watcher's first step.)
+    void (startWith Inherited (const (count (-1))) pure (Label "abandoning" "watcher") watch)
  where
   watch = do
     report (StillRuns limit)
