@@ -4,6 +4,7 @@ module Abandons (attack) where
 
 import Control.Concurrent
 import Control.Exception
+import Control.Monad (replicateM_)
 import Data.Foldable (for_)
 import GHC.Conc (setUncaughtExceptionHandler)
 
@@ -22,7 +23,7 @@ attack = do
       _ <- try (unmask (abandoning 0 (uninterruptibleMask_ (readMVar mayEnd)))) :: IO (Either SomeException ())
       putMVar over ()
     takeMVar ready
-    for_ [1 .. k `mod` 50] $ \_ -> yield
+    replicateM_ (k `mod` 50) yield
     throwTo caller (Boom k)
     _ <- inThread 5000 "abandoning" (takeMVar over)
     putMVar mayEnd ()
