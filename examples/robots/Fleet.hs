@@ -1,0 +1,74 @@
+-- |
+-- Robots that take orders from one queue and share a few chargers. Each order is handed over once,
+-- whatever happens to the robots: a robot that faults or is withdrawn gives its order back, and
+-- frees its charger.
+module Fleet
+  ( Fleet (..)
+  , Robot (..)
+  , Order
+  , fleet
+  ) where
+
+import Control.Exception (bracket_, displayException, finally, mask)
+import Control.Monad (forever, void)
+
+import Behavior
+import qualified Behavior.Parallel as Parallel
+import Behavior.STM
+import Behavior.Signal (Signal)
+import qualified Behavior.Signal as Signal
+
+type Order = Int
+
+-- | What the robots share.
+data Fleet = Fleet
+  { orders :: TQueue Order
+  , freeChargers :: TVar Int
+  , logLine :: String -> Behavior ()
+  }
+
+-- | The hardware of one robot. @main@ fills this record with drivers, and a test with a mock.
+data Robot = Robot
+  { name :: String
+  , carry, handOver :: Order -> Behavior ()
+  , charge :: Behavior ()
+  , batteryLow :: Signal Bool
+  , withdrawn :: Signal Bool
+  -- ^ Becomes true when the human operator takes this robot out of service.
+  }
+
+-- | All robots work side by side. A robot that faults or is withdrawn does not stop the others.
+-- Fails when no robot is left.
+fleet :: Fleet -> [Robot] -> Behavior ()
+fleet shared robots = do
+  void (Parallel.allOf (map inService robots))
+  failWith "no robot is left"
+ where
+  inService robot =
+    Signal.insteadWhen (withdrawn robot) (logLine shared (name robot ++ " is withdrawn")) (work shared robot)
+      `catchAny` \fault -> logLine shared (name robot ++ " is out of service: " ++ displayException fault)
+
+-- | Takes orders and carries them out. An order is in the queue, or in the variable of one robot,
+-- or handed over; each step from one to the next is one transaction or is masked, so no
+-- interruption can lose the order there, or have it done twice.
+work :: Fleet -> Robot -> Behavior ()
+work shared robot = do
+  mine <- newTVarIO []
+  let takeOrder = atomically (readTQueue (orders shared) >>= \order -> writeTVar mine [order])
+      giveBack = atomically (swapTVar mine [] >>= mapM_ (unGetTQueue (orders shared)))
+      -- After an interruption, the robot goes on with the order that it has.
+      finishMine = mask $ \restore -> resumable mine $ \order -> do
+        restore (carry robot order)
+        handOver robot order
+  Signal.monitor (batteryLow robot) (recharge shared robot) (forever (finishMine >> takeOrder))
+    `finally` giveBack
+
+-- | Waits for a free charger, and frees it again, however the charging ends.
+recharge :: Fleet -> Robot -> Behavior ()
+recharge shared robot = bracket_ takeCharger freeCharger (charge robot)
+ where
+  takeCharger = atomically $ do
+    free <- readTVar (freeChargers shared)
+    check (free > 0)
+    writeTVar (freeChargers shared) (free - 1)
+  freeCharger = atomically (modifyTVar' (freeChargers shared) (+ 1))
