@@ -26,9 +26,9 @@ spec = guarded $ do
   it "fails when no robot is left, and keeps the orders" $
     survives 100 (day [quiet "Bo" [5], quiet "Ed" [5]] "failure: FailedBecause \"no robot is left\"" (never (successOf "hand over")) fleet)
   it "and robots that take an order and then protect it lose one" $
-    failsWith "it was so 0 times" 500 (day worst "returned" once (each takeThenProtect))
+    failsWith "It was so 0 times" 500 (day worst "returned" once (each takeThenProtect))
   it "and robots that can be interrupted as they hand over an order do it twice" $
-    failsWith "it was so 2 times" 500 (day worst "returned" once (each takeInBracket))
+    failsWith "It was so 2 times" 500 (day worst "returned" once (each takeInBracket))
  where
   once = foldMap (\order -> exactly 1 (successOf ("hand over " ++ show order))) [1 .. 6 :: Order]
   each serve shared robots = void (Parallel.allOf [forever (serve shared robot) `outOfService` robot | robot <- robots])

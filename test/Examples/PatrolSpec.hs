@@ -18,11 +18,13 @@ import Support (guarded)
 spec :: Spec
 spec = guarded $ do
   it "reports each waypoint once in each round, although the battery becomes low as it arrives" $
-    survives 500 (worstDay patrol)
+    survives 300 (worstDay 16 patrol)
   it "and a robot that can be interrupted between its report and the next waypoint does not" $
-    failsWith "\"report" 500 (worstDay (interrupted (\robot ahead -> resumable ahead (visit robot) >> atomically (writeTVar ahead (waypoints robot)))))
+    failsWith "\"report" 300 . worstDay 6 . interrupted $ \robot ahead ->
+      resumable ahead (visit robot) >> atomically (writeTVar ahead (waypoints robot))
   it "and a robot that begins its round again after charging does not" $
-    failsWith "\"report" 500 (worstDay (interrupted (\robot _ -> for_ (waypoints robot) (visit robot))))
+    failsWith "\"report" 300 . worstDay 6 . interrupted $ \robot _ ->
+      for_ (waypoints robot) (visit robot)
  where
   visit robot place = driveTo robot place >> report robot place
   interrupted aRound robot = do
@@ -32,18 +34,18 @@ spec = guarded $ do
         Signal.monitor (personSeen robot) (investigate robot) $
           forever (aRound robot ahead)
 
--- | The battery becomes low when the robot arrives at A, and again when it arrives at B. Then it
--- sees a person, and charges meanwhile; at last the red button is pressed.
-worstDay :: (Patrol -> Behavior ()) -> Day
-worstDay robot simulated = do
+-- | The battery becomes low each time when the robot arrives somewhere; once it sees a person in the
+-- same instant. At last the red button is pressed, just when it arrives.
+worstDay :: Seconds -> (Patrol -> Behavior ()) -> Day
+worstDay pressedAt robot simulated = do
   world <- newMock
-  low <- condition world "battery low" [(0, False), (2, True), (7, True), (12, True)]
-  seen <- condition world "person seen" [(0, False), (11, True)]
-  button <- condition world "red button" [(0, False), (30, True)]
-  drive <- actionOn world "drive to" (const [succeeds `taking` 2 `slowToStop` 0.5])
+  low <- condition world "battery low" [(0, False), (2, True), (5, True), (8, True)]
+  seen <- condition world "person seen" [(0, False), (8, True)]
+  button <- condition world "red button" [(0, False), (pressedAt, True)]
+  drive <- actionOn world "drive to" (const [succeeds `taking` 2])
   reports <- actionOn world "report" (const [succeeds])
-  charge <- action world "recharge" [succeeds `taking` 3 `causing` set low False]
-  look <- action world "investigate" [succeeds `taking` 2 `causing` set seen False]
+  charge <- action world "recharge" [succeeds `taking` 1 `causing` set low False]
+  look <- action world "investigate" [succeeds `taking` 1 `causing` set seen False]
   off <- action world "motors off" [succeeds]
   run <-
     simulated . robot $
@@ -60,11 +62,11 @@ worstDay robot simulated = do
         , redButton = signal button
         }
   ended run `shouldBe` "returned"
-  world `shouldRecord` inOrder <> eventually (successOf (reportOf "C"))
-  world `shouldRecord` whenever (becoming "battery low" True) (withinSeconds 0.5 (startOf "recharge"))
+  world `shouldRecord` inOrder <> eventually (successOf (reportOf (if pressedAt > 10 then "C" else "A")))
+  world `shouldRecord` whenever (becoming "battery low" True) (withinSeconds 0 (startOf "recharge"))
   world `shouldRecord` never (running "drive to" `overlapping` running "recharge")
   world `shouldRecord` never (running "drive to" `overlapping` running "investigate")
-  world `shouldRecord` whenever (becoming "red button" True) (withinSeconds 0.5 (successOf "motors off"))
+  world `shouldRecord` whenever (becoming "red button" True) (withinSeconds 0 (successOf "motors off"))
   world `shouldRecord` exactly 1 (startOf "motors off") <> whenever (startOf "motors off") (never (startOf "drive to"))
 
 places :: [Waypoint]
