@@ -30,7 +30,9 @@ data Fleet = Fleet
 -- | The hardware of one robot. @main@ fills this record with drivers, and a test with a mock.
 data Robot = Robot
   { name :: String
-  , carry, handOver :: Order -> Behavior ()
+  , carry :: Order -> Behavior ()
+  , handOver :: Order -> Behavior ()
+  -- ^ After it has handed over the order, it must not block.
   , charge :: Behavior ()
   , batteryLow :: Signal Bool
   , withdrawn :: Signal Bool

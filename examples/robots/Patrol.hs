@@ -15,32 +15,34 @@ import Behavior
 import Behavior.STM
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
+import qualified Behavior.Time as Time
 
 type Waypoint = String
 
 -- | The hardware. @main@ fills this record with drivers, and a test with a mock.
 data Patrol = Patrol
   { waypoints :: [Waypoint]
+  -- ^ At least one.
   , driveTo :: Waypoint -> Behavior ()
   , report :: Waypoint -> Behavior ()
-  -- ^ Reports that all is well at this waypoint.
+  -- ^ Reports that all is well at this waypoint. After it has sent the report, it must not block.
   , recharge, investigate, motorsOff :: Behavior ()
   , batteryLow, personSeen, redButton :: Signal Bool
   }
 
--- | Patrols until the red button is pressed. However it ends, the motors are off.
+-- | Patrols until the red button is pressed. However it ends, the motors are off. (A cancellation
+-- would interrupt a plain @motorsOff robot@ that has to wait for its driver.)
 --
--- The outer condition outranks the inner one: the battery interrupts an investigation, and the
--- button interrupts everything.
+-- The rules are in the order of their rank: the battery interrupts an investigation, and the button
+-- interrupts everything.
 patrol :: Patrol -> Behavior ()
 patrol robot = do
   ahead <- newTVarIO (waypoints robot)
-  untilPressed (Signal.monitor low (recharge robot) (Signal.monitor seen (investigate robot) (rounds robot ahead)))
-    `finally` motorsOff robot
- where
-  untilPressed = Signal.insteadWhen (redButton robot) (pure ())
-  low = batteryLow robot
-  seen = personSeen robot
+  let withRules =
+        Signal.insteadWhen (redButton robot) (pure ())
+          . Signal.monitor (batteryLow robot) (recharge robot)
+          . Signal.monitor (personSeen robot) (investigate robot)
+  withRules (rounds robot ahead) `finally` Time.cleanupWithin 1 (motorsOff robot)
 
 -- | Visits the waypoints that are ahead, then all of them again, and so on. The variable keeps the
 -- place: a waypoint stays in it until it has been reported.

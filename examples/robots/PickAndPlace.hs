@@ -11,7 +11,6 @@ module PickAndPlace
   ) where
 
 import Control.Exception (finally)
-import Control.Monad (void)
 import Data.List (tails)
 
 import Behavior
@@ -50,7 +49,7 @@ pickAndPlace arm = (pick >> (carry ? (pick >> carry)) >> gripper arm Open) `fina
   carry = Signal.whileHolding (holding arm) (moveTo arm Box)
   -- A plain @park arm@ would itself be stopped if a cancellation came while it runs. The limit
   -- is for an arm that is stuck.
-  parked = void (Time.cleanupWithin 5 (park arm))
+  parked = Time.cleanupWithin 5 (park arm)
 
 -- | Closes the gripper around the part; fails if there is no part in it then.
 grip :: Arm -> Double -> Behavior ()

@@ -2,6 +2,7 @@
 -- The robot that patrols, on its worst day: its battery becomes low just when it arrives.
 module Examples.PatrolSpec (spec) where
 
+import Control.Exception (uninterruptibleMask_)
 import Control.Monad (forever)
 import Data.Foldable (for_)
 import Test.Hspec
@@ -10,7 +11,7 @@ import Behavior
 import Behavior.STM
 import Behavior.Sim.Mock
 import qualified Behavior.Signal as Signal
-import Behavior.Time (checkpoint)
+import Behavior.Time (checkpoint, timeout)
 import Examples.WorstDay
 import Patrol
 import Support (guarded)
@@ -29,13 +30,12 @@ spec = guarded $ do
   visit robot place = driveTo robot place >> report robot place
   interrupted aRound robot = do
     ahead <- newTVarIO (waypoints robot)
-    Signal.insteadWhen (redButton robot) (motorsOff robot) $
-      Signal.monitor (batteryLow robot) (recharge robot) $
-        Signal.monitor (personSeen robot) (investigate robot) $
-          forever (aRound robot ahead)
+    Signal.insteadWhen (redButton robot) (uninterruptibleMask_ (motorsOff robot)) $
+      Signal.monitor (batteryLow robot) (recharge robot) (forever (aRound robot ahead))
 
 -- | The battery becomes low each time when the robot arrives somewhere; once it sees a person in the
--- same instant. At last the red button is pressed, just when it arrives.
+-- same instant. At last the red button is pressed, just when it arrives; and while the motors are
+-- switched off, the robot is cancelled.
 worstDay :: Seconds -> (Patrol -> Behavior ()) -> Day
 worstDay pressedAt robot simulated = do
   world <- newMock
@@ -46,9 +46,9 @@ worstDay pressedAt robot simulated = do
   reports <- actionOn world "report" (const [succeeds])
   charge <- action world "recharge" [succeeds `taking` 1 `causing` set low False]
   look <- action world "investigate" [succeeds `taking` 1 `causing` set seen False]
-  off <- action world "motors off" [succeeds]
+  off <- action world "motors off" [succeeds `taking` 0.5]
   run <-
-    simulated . robot $
+    simulated . (? pure ()) . timeout (pressedAt + 0.25) . robot $
       Patrol
         { waypoints = places
         , driveTo = drive
@@ -66,7 +66,7 @@ worstDay pressedAt robot simulated = do
   world `shouldRecord` whenever (becoming "battery low" True) (withinSeconds 0 (startOf "recharge"))
   world `shouldRecord` never (running "drive to" `overlapping` running "recharge")
   world `shouldRecord` never (running "drive to" `overlapping` running "investigate")
-  world `shouldRecord` whenever (becoming "red button" True) (withinSeconds 0 (successOf "motors off"))
+  world `shouldRecord` whenever (becoming "red button" True) (withinSeconds 0.5 (successOf "motors off"))
   world `shouldRecord` exactly 1 (startOf "motors off") <> whenever (startOf "motors off") (never (startOf "drive to"))
 
 places :: [Waypoint]
