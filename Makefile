@@ -2,6 +2,7 @@
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
+	@echo '               (ROBOT=patrol, pick-and-place, drone or fleet runs another robot)'
 	@echo 'make test      the test suite, under three runtimes (ARGS="-m NAME" selects tests)'
 	@echo 'make programs  run the example programs and check how each run ends'
 	@echo 'make warnings  build everything with warnings as errors'
@@ -22,8 +23,12 @@ help:
 	@echo 'make clean     remove what was built'
 
 demo:
+ifdef ROBOT
+	@.ci/exec robots '$(ROBOT)'
+else
 	@.ci/exec door-battery --front locked --back locked --battery 15 --drain 2 \
 	  --charge 40 --threshold 10 --action 1 --speed 3
+endif
 
 test:
 	@.ci/test $(ARGS)

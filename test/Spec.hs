@@ -36,7 +36,11 @@ import qualified Behavior.CancellationStressSpec
 import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
 import qualified Examples.DoorBatterySpec
+import qualified Examples.DroneSpec
+import qualified Examples.FleetSpec
 import qualified Examples.GreenhouseRoverSpec
+import qualified Examples.PatrolSpec
+import qualified Examples.PickAndPlaceSpec
 import qualified Examples.ProgressProblemSpec
 import qualified Examples.TestingARobotSpec
 import qualified Examples.YourOwnMonadSpec
@@ -120,5 +124,10 @@ main = hspec $ do
     describe "door-battery" Examples.DoorBatterySpec.spec
     describe "greenhouse-rover" Examples.GreenhouseRoverSpec.spec
     describe "progress-problem" Examples.ProgressProblemSpec.spec
+    describe "Robots" $ do
+      describe "patrol" Examples.PatrolSpec.spec
+      describe "pick-and-place" Examples.PickAndPlaceSpec.spec
+      describe "drone" Examples.DroneSpec.spec
+      describe "fleet" Examples.FleetSpec.spec
     describe "testing-a-robot" Examples.TestingARobotSpec.spec
     describe "your own monad" Examples.YourOwnMonadSpec.spec

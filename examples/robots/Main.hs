@@ -1,0 +1,141 @@
+-- |
+-- Four robots with simulated hardware, in real time: each prints what it does, for some seconds.
+module Main (main) where
+
+import Control.Exception (onException, throwIO)
+import Control.Monad (forever, void, when)
+import Data.List (intercalate)
+import System.Environment (getArgs)
+import System.Exit (ExitCode (..), exitWith)
+import System.IO (BufferMode (..), hPutStrLn, hSetBuffering, stderr, stdout)
+
+import Behavior
+import Behavior.STM
+import qualified Behavior.Signal as Signal
+import Behavior.Message (withInbox)
+import Behavior.Sim.Mock (begin, condition, driver, newMock, set, signal)
+import Drone (Drone (Drone), drone)
+import qualified Drone
+import Fleet (Fleet (Fleet), Robot (Robot), fleet)
+import qualified Fleet
+import Patrol (Patrol (Patrol), patrol)
+import qualified Patrol
+import PickAndPlace
+
+main :: IO ()
+main = do
+  hSetBuffering stdout LineBuffering
+  arguments <- getArgs
+  case arguments of
+    [name] | Just demo <- lookup name demos -> runBehavior (demo >> putStrLn "the demo is over")
+    _ -> do
+      hPutStrLn stderr ("robots: not a robot: " ++ show (unwords arguments) ++ "; allowed: " ++ intercalate ", " (map fst demos))
+      exitWith (ExitFailure 2)
+
+demos :: [(String, Behavior ())]
+demos = [("patrol", patrolDemo), ("pick-and-place", pickAndPlaceDemo), ("drone", droneDemo), ("fleet", fleetDemo)]
+
+-- | An action that takes time: prints when it starts, and when it is stopped early.
+step :: String -> Seconds -> Behavior ()
+step name seconds = putStrLn name >> sleep seconds `onException` putStrLn ("(stopped: " ++ name ++ ")")
+
+patrolDemo :: Behavior ()
+patrolDemo = do
+  world <- newMock
+  low <- condition world "battery low" [(0, False), (2.3, True)]
+  seen <- condition world "person seen" [(0, False), (4, True)]
+  button <- condition world "red button" [(0, False), (7, True)]
+  begin world
+  patrol
+    Patrol
+      { Patrol.waypoints = ["gate", "yard", "store"]
+      , Patrol.driveTo = \place -> step ("drive to the " ++ place) 0.8
+      , Patrol.report = \place -> putStrLn ("all is well at the " ++ place)
+      , Patrol.recharge = step "recharge" 0.7 >> set low False
+      , Patrol.investigate = step "say hello to the person" 0.7 >> set seen False
+      , Patrol.motorsOff = putStrLn "motors off"
+      , Patrol.batteryLow = signal low
+      , Patrol.personSeen = signal seen
+      , Patrol.redButton = signal button
+      }
+
+pickAndPlaceDemo :: Behavior ()
+pickAndPlaceDemo = do
+  world <- newMock
+  -- The first grip misses the part; it slips once on the way.
+  held <- condition world "holding" [(0, False)]
+  grips <- newTVarIO [False, True, True]
+  moves <- newTVarIO (0 :: Int)
+  let slips = do
+        n <- atomically (modifyTVar' moves (+ 1) >> readTVar moves)
+        when (n == 1) (sleep 0.5 >> putStrLn "(the part slips)" >> set held False)
+  pickAndPlace
+    Arm
+      { detectors = [pure 12.1, forever (sleep 3600), sleep 0.3 >> pure 12.5]
+      , moveTo = \place -> case place of
+          Box -> void (both (step "move to the box" 1) slips)
+          _ -> step ("move to " ++ show place) 0.5
+      , gripper = \grip' -> do
+          step ("gripper: " ++ show grip') 0.3
+          holds <- if grip' == Open then pure False else atomically (stateTVar grips (\left -> (take 1 left == [True], drop 1 left)))
+          set held holds
+      , holding = signal held
+      , park = step "park the arm" 0.5
+      }
+
+droneDemo :: Behavior ()
+droneDemo = do
+  world <- newMock
+  windy <- condition world "strong wind" [(0, False)]
+  low <- condition world "battery low" [(0, False), (4.5, True)]
+  crane <- newTVarIO False
+  begin world
+  drone
+    Drone
+      { Drone.motorsOn = putStrLn "motors on"
+      , Drone.takeOff = step "take off" 0.5
+      , Drone.land = step "land" 0.5
+      , Drone.motorsOff = putStrLn "motors off"
+      , Drone.flyTo = \place -> step ("fly to " ++ place) 0.8
+      , Drone.home = "home"
+      , Drone.film = putStrLn "camera on" >> sleep 3600 `onException` putStrLn "camera off"
+      , Drone.firstPath = ["row 1", "row 2", "row 3", "row 4", "row 5"]
+      , Drone.nextPath = do
+          again <- readTVarIO crane
+          sleep (if again then 3600 else 1.2)
+          atomically (writeTVar crane True)
+          putStrLn "(there is a crane: the planner computes a new path)"
+          sleep 0.6
+          pure ["row 5", "row 4", "row 3"]
+      , Drone.timeLimit = 60
+      , Drone.strongWind = signal windy
+      , Drone.batteryLow = signal low
+      , Drone.logLine = putStrLn
+      }
+
+fleetDemo :: Behavior ()
+fleetDemo = do
+  world <- newMock
+  orders <- driver world "orders" [(0, n) | n <- [1 .. 6]]
+  chargers <- newTVarIO 1
+  handedOver <- newTVarIO (0 :: Int)
+  let robot who lowAt = do
+        low <- condition world (who ++ ": battery low") [(0, False), (lowAt, True)]
+        pure
+          Robot
+            { Fleet.name = who
+            , Fleet.carry = \order -> do
+                step (who ++ ": carry order " ++ show order) 1
+                when (who == "Bo" && order > 3) (throwIO (userError "a wheel is lost"))
+            , Fleet.handOver = \order -> do
+                putStrLn (who ++ ": order " ++ show order ++ " is handed over")
+                atomically (modifyTVar' handedOver (+ 1))
+            , Fleet.charge = step (who ++ ": charge") 0.8 >> set low False
+            , Fleet.batteryLow = signal low
+            , Fleet.withdrawn = pure False
+            }
+  robots <- traverse (uncurry robot) [("Ann", 1.4), ("Bo", 60), ("Cid", 1.5)]
+  begin world
+  withInbox 10 orders $ \inbox ->
+    Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver))
+      ||| fleet Fleet {Fleet.orders = inbox, Fleet.freeChargers = chargers, Fleet.logLine = putStrLn} robots
