@@ -116,7 +116,7 @@ droneDemo = do
 fleetDemo :: Behavior ()
 fleetDemo = do
   world <- newMock
-  orders <- driver world "orders" [(0, n) | n <- [1 .. 6]]
+  orders <- driver world "orders" [(0.1, n) | n <- [1 .. 6]]
   chargers <- newTVarIO 1
   handedOver <- newTVarIO (0 :: Int)
   let robot who lowAt = do
