@@ -1,3 +1,5 @@
+{-# LANGUAGE LambdaCase #-}
+
 -- |
 -- What the specs of the four robots share: a property of a robot that is run under many schedules.
 module Examples.WorstDay
@@ -26,7 +28,7 @@ survives n day = void (explore (plan n) day)
 -- | Under one of the given number of random schedules the day has a bad end, with this in its text.
 failsWith :: String -> Int -> Day -> Expectation
 failsWith why n day =
-  tryExplore (plan n) day >>= \found -> case found of
+  tryExplore (plan n) day >>= \case
     Right report -> expectationFailure ("the wrong version is not rejected: " ++ show report)
     Left counterexample ->
       unless (why `isInfixOf` asHspec (reason counterexample)) $
