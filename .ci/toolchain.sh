@@ -26,6 +26,7 @@ libraries=(
   hspec:libghc-hspec-dev
   optparse-applicative:libghc-optparse-applicative-dev
   QuickCheck:libghc-quickcheck2-dev
+  unliftio-core:libghc-unliftio-core-dev
 )
 debian_packages=(ghc cabal-install "${libraries[@]#*:}")
 

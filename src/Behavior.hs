@@ -89,6 +89,9 @@
 --
 -- > (extend arm >> takePicture) `finally` cleanupWithin 3 (park arm)
 --
+-- A behaviour that may hang where nothing can interrupt it, so that its operator would wait for ever,
+-- can be abandoned: 'Behavior.Time.abandoning' is the only way out of promises 1, 2 and 4.
+--
 -- == What GHC limits
 --
 -- An operator waits for the cleanups of its branches. Meanwhile it receives the first

@@ -12,13 +12,15 @@ module Places
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception (SomeException, throwIO)
 import Control.Monad (void)
+import Data.Foldable (traverse_)
 import Data.Maybe (listToMaybe)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
+import Behavior.Message (handleNext, onMessage, withInbox)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, timeout)
+import Behavior.Time (abandoning, atomically, timeout)
 import Support
 
 -- | A place in an operator. All other branches of the operator do nothing: when the
@@ -66,6 +68,7 @@ places =
   , inThread "pinned" "body" pinned
   , inThread "unpinned" "body" unpinned
   , inThread "timeout" "branch" (timeout 3600)
+  , inThread "abandoning" "branch" (abandoning 3600)
   , inThread "rSelect" "left" (\act -> Signal.rSelect (pure True) act hang)
   , inThread "rSelect" "right" (\act -> rSelect (pure False) hang act)
   , inThread "monitor" "task" (monitor (pure False) hang)
@@ -78,12 +81,19 @@ places =
       Signal.teleoReactive [(pure False, hang), (pure True, act)]
   , inThread "insteadWhen" "branch" (Signal.insteadWhen (pure False) hang)
   , inThread "insteadWhen" "emergency" (\act -> Signal.insteadWhen (pure True) act hang)
+  , inThread "onMessage" "task" (\act -> withMessages [] (\inbox -> onMessage inbox (\() -> hang) act))
+  , inThread "onMessage" "handler" $ \act ->
+      withMessages [()] (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure ()))
+  , inPlace "the handler of handleNext" $ \act ->
+      withMessages [()] (\inbox -> handleNext inbox (\() -> pure () <$ act))
+  , inPlace "withInbox" (withMessages [()] . const)
   , inThread "whileHolding" "branch" (Signal.whileHolding (pure True))
   , inThread "withShared" "body" (\act -> Signal.withShared (pure ()) (const act))
   , inThread "waitUntil" "polling" $ \act ->
       Signal.waitUntil (Signal.polling 3600 (True <$ act))
   ]
  where
+  withMessages messages = withInbox 1 (\deliver -> pure () <$ traverse_ deliver messages)
   firstEnd ends = listToMaybe [either throwIO pure end | Just end <- ends]
   inPlace name = Place name Nothing
   inThread operator name = Place (show label) (Just label) where label = Label operator name

@@ -115,6 +115,11 @@ rareWorlds =
     (alone (RSelect (And (Hysteresis False 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
       { changes = [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "q" (At 1)]
       }
+  , -- A throttled change is reverted just when it may be taken.
+    (alone (WhileHolding (Throttle 1 (Watched "p")) (act 4 "a" Fails StopsAtOnce)))
+      { conditions = [("p", At 1)]
+      , changes = [Change 1 "p" (At 0), Change 1 "p" (At 1)]
+      }
   , -- A change has lasted long enough just when it is reverted.
     (alone (WhileHolding (Debounce 1 (Watched "p")) (act 4 "a" Fails StopsAtOnce)))
       { conditions = [("p", At 1)]
@@ -349,6 +354,8 @@ relation = do
     it "with a debounce ignore a short change" $
       with [Change 1 "p" (At 1), Change 2 "p" (At 0), Change 3 "p" (At 1)] (WaitUntil (Debounce 2 (Watched "p")))
         `endsWith` [Gave 5 (Succeeded Unit)]
+    it "with a throttle take a change when the time has passed since the one before" $
+      with [Change 1 "p" (At 1)] (WaitUntil (Throttle 3 (Watched "p"))) `endsWith` [Gave 3 (Succeeded Unit)]
     it "fail while a reading takes too long, and the operator waits for the reading to stop" $
       WaitUntil (StaleAfter 2 (Polled 1 (stoppedBy (StopsAfter 3) "s"))) `endsIn` [Gave 5 (Failed (overdueBy 2))]
     it "are read once for all operators that share them" $

@@ -3,10 +3,12 @@ module Main (main) where
 import Test.Hspec
 
 import qualified Behavior.TimerWheelSpec
+import qualified Behavior.AbandoningSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
 import qualified Behavior.InsteadWhenSpec
+import qualified Behavior.MessageSpec
 import qualified Behavior.MonitorSpec
 import qualified Behavior.CleanupSpec
 import qualified Behavior.DecideSpec
@@ -18,6 +20,7 @@ import qualified Behavior.PinnedSpec
 import qualified Behavior.PolledSpec
 import qualified Behavior.PollingSpec
 import qualified Behavior.PromisesSpec
+import qualified Behavior.RateSpec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
 import qualified Behavior.FilterSpec
@@ -40,6 +43,7 @@ import qualified Examples.PatrolSpec
 import qualified Examples.PickAndPlaceSpec
 import qualified Examples.ProgressProblemSpec
 import qualified Examples.TestingARobotSpec
+import qualified Examples.YourOwnMonadSpec
 import qualified Paper.DoorsSpec
 import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
@@ -71,6 +75,7 @@ main = hspec $ do
     Behavior.BadReadingSpec.spec
     Behavior.EqualitySuppressionSpec.spec
     Behavior.FilterSpec.spec
+    Behavior.RateSpec.spec
     Behavior.OperatorsSpec.spec
     Behavior.OutcomeSpec.spec
     Behavior.ReactiveSpec.spec
@@ -80,11 +85,13 @@ main = hspec $ do
   describe "Time" $ do
     Behavior.TimeSpec.spec
     Behavior.CleanupSpec.spec
+    Behavior.AbandoningSpec.spec
     Behavior.RepeatingSpec.spec
     Behavior.TimerWheelSpec.spec
   describe "STM" $ do
     Behavior.STMSpec.spec
     describe "resumable" Behavior.ResumableSpec.spec
+  describe "Messages" Behavior.MessageSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
   describe "From outside" $ do
@@ -123,3 +130,4 @@ main = hspec $ do
       describe "drone" Examples.DroneSpec.spec
       describe "fleet" Examples.FleetSpec.spec
     describe "testing-a-robot" Examples.TestingARobotSpec.spec
+    describe "your own monad" Examples.YourOwnMonadSpec.spec

@@ -17,10 +17,18 @@ module Behavior.Signal
   , watching
   , polling
 
-    -- ** Filtering, and detecting stale readings
-  , staleAfter
+    -- ** Filtering
   , debounce
+  , throttle
   , hysteresis
+  , changes
+
+    -- ** Detecting stale readings
+  , staleAfter
+  , olderThan
+
+    -- ** Naming
+  , named
 
     -- ** Sharing between operators
   , withShared

@@ -25,8 +25,14 @@ module Behavior.Time
   , timeout
   , TimedOut (..)
   , cleanupWithin
+
+    -- * Going on without a behaviour that does not stop
+  , abandoning
+  , abandonedCount
+  , Abandoned (..)
   ) where
 
+import Behavior.Internal.Abandoning
 import Behavior.Internal.Reactive.Timeout
 import Behavior.Internal.Repeating
 import Behavior.Internal.Runtime

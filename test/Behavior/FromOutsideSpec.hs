@@ -17,10 +17,11 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Internal.Runtime (atomically)
+import Behavior.Message (onMessage, withInbox)
 import Behavior.Parallel (allOf, decide, firstOf, scoped)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior.Time (abandoning, timeout)
 import Support hiding (End (..))
 
 spec :: Spec
@@ -40,6 +41,7 @@ operators =
   , ("scoped", scoped . const)
   , ("withShared", Signal.withShared (pure True) . const)
   , ("timeout", timeout 3600)
+  , ("abandoning", abandoning 3600)
   , ("whileHolding", Signal.whileHolding (pure True))
   , ("switch", Signal.switch (pure 'k') . const)
   , ("teleoReactive", \act -> Signal.teleoReactive [(pure True, act)])
@@ -48,9 +50,14 @@ operators =
   , ("rSelect", \act -> Signal.rSelect (pure True) act (pure ""))
   , ("monitor", Signal.monitor (pure False) (pure ()))
   , ("monitor (its recovery)", \act -> Signal.monitor (pure True) (void act) (pure ""))
+  , ("onMessage", \act -> withInbox 1 silent (\inbox -> onMessage inbox (\() -> hang) act))
+  , ("onMessage (its handler)", \act -> withInbox 1 speaking (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure "")))
   , ("rSelect, polled", \act -> rSelect (pure True) act (pure ""))
   , ("monitor, polled", monitor (pure False) (pure ()))
   ]
+ where
+  silent _ = pure (pure ())
+  speaking deliver = pure () <$ deliver ()
 
 -- | What a branch does when it is stopped.
 data Stopping = Stops | Completes | Fails | Faults

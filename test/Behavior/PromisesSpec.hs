@@ -123,7 +123,8 @@ cancelled = do
         `shouldReturn` isCancelled
     notes entries `shouldReturn` []
 
-  inEach threaded "receives no deadlock exception while it waits for a cleanup that is deadlocked" $ \place -> do
+  -- (Where 'abandoning' limits the wait, GHC does not take the cleanup for deadlocked.)
+  inEach (filter ((/= "abandoning: branch") . placeName) threaded) "receives no deadlock exception while it waits for a cleanup that is deadlocked" $ \place -> do
     entries <- newLog
     inside <- newGate
     cleaning <- newGate

@@ -10,6 +10,7 @@ module Semantics.Filter
   , Join (..)
   , HysteresisState (..)
   , Debouncer (..)
+  , Throttler (..)
   , ChangeTracking (..)
   , Watchdog (..)
   , WatchdogState (..)
@@ -84,6 +85,16 @@ data Debouncer = Debouncer
 data ChangeTracking
   = Tracked (Maybe Int)
   | Observed (Maybe Int) Int
+  deriving (Eq, Ord, Show)
+
+data Throttler = Throttler
+  { gap :: Ticks
+  , passed :: Maybe Int
+  -- ^ The value of the throttled signal.
+  , throttleWorker :: Worker
+  , restsUntil :: Maybe Ticks
+  -- ^ Until when it takes no other value.
+  }
   deriving (Eq, Ord, Show)
 
 data Watchdog = Watchdog

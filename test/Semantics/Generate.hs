@@ -98,6 +98,7 @@ within' inScope sharing = go
       , (1, And <$> signal 0 <*> sensor n)
       , (1, hysteresis <*> sensor n)
       , (1, Debounce <$> choose (0, 3) <*> sensor n)
+      , (1, Throttle <$> choose (0, 3) <*> sensor n)
       , (1, StaleAfter <$> choose (1, 3) <*> sensor n)
       ]
   hysteresis = do

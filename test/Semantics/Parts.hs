@@ -48,6 +48,7 @@ ofSignal = \case
   And s s' -> ofSignal s ++ ofSignal s'
   Hysteresis _ _ _ s -> ofSignal s
   Debounce _ s -> ofSignal s
+  Throttle _ s -> ofSignal s
   StaleAfter _ s -> ofSignal s
   Shared -> []
 
@@ -88,6 +89,7 @@ sensing signal as = case (signal, as) of
   (And s s', _) -> let (new, others) = sensing s as in first (And new) (sensing s' others)
   (Hysteresis initially low high s, _) -> first (Hysteresis initially low high) (sensing s as)
   (Debounce n s, _) -> first (Debounce n) (sensing s as)
+  (Throttle n s, _) -> first (Throttle n) (sensing s as)
   (StaleAfter n s, _) -> first (StaleAfter n) (sensing s as)
   _ -> (signal, as)
 

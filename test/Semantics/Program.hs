@@ -113,6 +113,7 @@ data Signal
   | -- | One where it is high, otherwise zero. The lower threshold comes first.
     Hysteresis Bool Int Int Signal
   | Debounce Ticks Signal
+  | Throttle Ticks Signal
   | StaleAfter Ticks Signal
   | -- | The signal of the nearest 'WithShared' around it.
     Shared

@@ -37,7 +37,7 @@ import Behavior.Internal.Parallel (allOf, both, decide, firstOf, parallel)
 import Behavior.Internal.Reactive.Operators
 import Behavior.Internal.Reactive.Timeout
 import Behavior.Internal.Runtime hiding (Event (..), Label)
-import Behavior.Internal.Signal.Filter
+import Behavior.Internal.Signal.Filter (debounce, hysteresis, throttle)
 import Behavior.Internal.Signal.Polling
 import Behavior.Internal.Signal.Shared (withShared)
 import Behavior.Internal.Signal.Source (watching)
@@ -113,7 +113,7 @@ observing simulated world = do
     (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others transitions
     _ -> recorded others transitions
   recorded [] _ = []
-  isBranch (Label _ name) = name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "hysteresis"]
+  isBranch (Label _ name) = name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "throttle", "hysteresis"]
 
 -- | The state that a program runs with: the conditions, the number of calls of each action,
 -- how to fork into the innermost scope, and the innermost shared signal.
@@ -190,6 +190,7 @@ toBehavior emit stage = go
     And a b -> (\m n -> fromEnum (holds m && holds n)) <$> level a <*> level b
     Hysteresis initially low high signal -> fromEnum <$> hysteresis initially low high (level signal)
     Debounce n signal -> debounce (fromIntegral n) (level signal)
+    Throttle n signal -> throttle (fromIntegral n) (level signal)
     StaleAfter n signal -> staleAfter (fromIntegral n) (level signal)
     Shared -> nearest stage
   reading :: Condition -> STM Int

@@ -54,6 +54,7 @@ sourceSteps steps receive = go
     Joined how sources -> [(l, t', Joined how sources') | (l, t', sources') <- oneOf (go t) sources]
     WithHysteresis m source -> inside t (WithHysteresis m) source ++ hysteresisSteps t m source
     Debounced d source -> inside t (Debounced d) source ++ debounceSteps t d source
+    Throttled h source -> inside t (Throttled h) source ++ throttleSteps t h source
     WithWatchdog w source -> inside t (WithWatchdog w) source ++ [(l, t', WithWatchdog w' source) | (l, t', w') <- watchdogSteps t w source]
     _ -> []
   inside t around source = [(l, t', around source') | (l, t', source') <- go t source]
@@ -132,6 +133,20 @@ debounceSteps t d source =
       | clock t < since + delay d -> []
       | pending d == timedChange d -> [d {settled = Just value, pending = Nothing, timedChange = Nothing}]
       | otherwise -> [d {timedChange = Nothing}]
+
+-- | The worker takes a value, and then none until the time has passed.
+throttleSteps :: Now -> Throttler -> Source -> Steps Source
+throttleSteps t h source =
+  (if request worker == Received then [] else next)
+    ++ [(Emits Silent, t, Throttled h {throttleWorker = worker {request = Received}} source) | request worker == Requested]
+ where
+  worker = throttleWorker h
+  next = case restsUntil h of
+    Just until' -> [step | clock t >= until', step <- silently t (Throttled h {restsUntil = Nothing} source)]
+    Nothing -> case readSource t FirstRead (view worker) source of
+      Just (Right (value, t', source'))
+        | Just value /= passed h -> silently t' (Throttled h {passed = Just value, restsUntil = Just (clock t + gap h)} source')
+      _ -> []
 
 -- | The watchdog.
 watchdogSteps :: Now -> Watchdog -> Source -> Steps Watchdog

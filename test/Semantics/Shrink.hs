@@ -78,5 +78,6 @@ shrinkSignal = \case
   And a b -> [a, b] ++ [And a' b | a' <- shrinkSignal a] ++ [And a b' | b' <- shrinkSignal b]
   Hysteresis initially low high s -> s : (Hysteresis initially low high <$> shrinkSignal s)
   Debounce n s -> s : (Debounce n <$> shrinkSignal s)
+  Throttle n s -> s : (Throttle n <$> shrinkSignal s)
   StaleAfter n s -> s : (StaleAfter n <$> shrinkSignal s)
   Shared -> [Watched "p"]

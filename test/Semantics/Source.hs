@@ -55,6 +55,7 @@ usesShared = \case
   And a b -> usesShared a || usesShared b
   Hysteresis _ _ _ s -> usesShared s
   Debounce _ s -> usesShared s
+  Throttle _ s -> usesShared s
   StaleAfter _ s -> usesShared s
 
 -- | Opens a signal, and starts the threads that it needs.
@@ -91,6 +92,7 @@ unstarted = \case
         , timedChange = Nothing
         }
       (unstarted s)
+  Throttle n s -> Throttled Throttler {gap = n, passed = Nothing, throttleWorker = resting, restsUntil = Nothing} (unstarted s)
   StaleAfter n s -> WithWatchdog Watchdog {limit = n, overdue = 0, watchdogRequest = Received, watchdogState = NoReading} (unstarted s)
   Shared -> SharedSource
  where
@@ -118,6 +120,9 @@ startSource t = \case
         , timer = NoRequest
         , timedChange = Nothing
         }
+  Throttled h source -> Throttled h {passed = Nothing, throttleWorker = workerFor inner, restsUntil = Nothing} inner
+   where
+    inner = startSource t source
   WithWatchdog w source -> WithWatchdog (notOverdue w) {watchdogRequest = NoRequest, watchdogState = NoReading} (startSource t source)
   other -> other
  where
@@ -131,6 +136,7 @@ viewOf t = \case
   Joined _ sources -> Each (map (viewOf t) sources)
   WithHysteresis _ source -> viewOf t source
   Debounced _ source -> viewOf t source
+  Throttled _ source -> viewOf t source
   WithWatchdog w source -> After (overdue w) (viewOf t source)
   SharedSource | s : outer <- shared t -> viewOf t {shared = outer} s
   _ -> Always
@@ -160,6 +166,8 @@ readSource t mode v source = case (source, v) of
      in found (fromEnum after) t' (WithHysteresis m {isHigh = after} inner')
   (Debounced d inner, _) -> inside v inner $ \_ t' inner' ->
     settled d >>= \n -> found n t' (Debounced d inner')
+  (Throttled h inner, _) -> inside v inner $ \_ t' inner' ->
+    passed h >>= \n -> found n t' (Throttled h inner')
   (WithWatchdog w inner, After n v')
     | odd (overdue w) || overdue w > n -> wrong (Failed (overdueBy (limit w)))
     | otherwise -> inside v' inner $ \m t' inner' -> found m t' (WithWatchdog w inner')
@@ -195,6 +203,7 @@ oldestReading t = \case
     since -> Just (minimum since)
   WithHysteresis _ source -> oldestReading t source
   Debounced _ source -> oldestReading t source
+  Throttled _ source -> oldestReading t source
   WithWatchdog _ source -> oldestReading t source
   SharedSource | s : outer <- shared t -> oldestReading t {shared = outer} s
   _ -> Nothing
@@ -208,6 +217,7 @@ requestStopOfSource = \case
   Joined how sources -> Joined how (map requestStopOfSource sources)
   WithHysteresis m source -> WithHysteresis m {hysteresisWorker = requestStopOfWorker (hysteresisWorker m)} (requestStopOfSource source)
   Debounced d source -> Debounced d {changeWorker = requestStopOfWorker (changeWorker d), timer = requestStop' (timer d)} (requestStopOfSource source)
+  Throttled h source -> Throttled h {throttleWorker = requestStopOfWorker (throttleWorker h)} (requestStopOfSource source)
   WithWatchdog w source -> WithWatchdog w {watchdogRequest = requestStop' (watchdogRequest w)} (requestStopOfSource source)
   other -> other
  where
@@ -224,6 +234,7 @@ allStopped = \case
   Joined _ sources -> all allStopped sources
   WithHysteresis m source -> request (hysteresisWorker m) == Received && allStopped source
   Debounced d source -> request (changeWorker d) == Received && timer d == Received && allStopped source
+  Throttled h source -> request (throttleWorker h) == Received && allStopped source
   WithWatchdog w source -> watchdogRequest w == Received && allStopped source
   _ -> True
 
@@ -234,6 +245,7 @@ pollerEnds = \case
   Joined _ sources -> concatMap pollerEnds sources
   WithHysteresis _ source -> pollerEnds source
   Debounced _ source -> pollerEnds source
+  Throttled _ source -> pollerEnds source
   WithWatchdog _ source -> pollerEnds source
   _ -> []
 
@@ -261,6 +273,7 @@ remaining = Joined AllHold . pollers
     Joined _ sources -> concatMap pollers sources
     WithHysteresis _ source -> pollers source
     Debounced _ source -> pollers source
+    Throttled _ source -> pollers source
     WithWatchdog _ source -> pollers source
     _ -> []
 

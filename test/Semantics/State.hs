@@ -35,7 +35,7 @@ module Semantics.State
   ) where
 
 import Data.Map.Strict (Map)
-import Data.Maybe (isJust)
+import Data.Maybe (isJust, maybeToList)
 import Data.Set (Set)
 
 import Semantics.Filter
@@ -172,6 +172,7 @@ data Source
   | Joined Join [Source]
   | WithHysteresis HysteresisState Source
   | Debounced Debouncer Source
+  | Throttled Throttler Source
   | WithWatchdog Watchdog Source
   | -- | The innermost of the 'shared' sources.
     SharedSource
@@ -271,6 +272,7 @@ dueTimes = \case
     Joined _ sources -> concatMap ofSource sources
     WithHysteresis _ source -> ofSource source
     Debounced d source -> [since + delay d | Just (_, since) <- [timedChange d]] ++ ofSource source
+    Throttled h source -> maybeToList (restsUntil h) ++ ofSource source
     WithWatchdog w source -> [since + limit w | InFlight since <- [watchdogState w]] ++ ofSource source
     _ -> []
 
@@ -302,6 +304,7 @@ afterTimePassed = \case
     Joined how sources -> Joined how (map ofSource sources)
     WithHysteresis m source -> WithHysteresis m (ofSource source)
     Debounced d source -> Debounced d (ofSource source)
+    Throttled h source -> Throttled h (ofSource source)
     WithWatchdog w source -> WithWatchdog w (ofSource source)
     source -> source
   ofRequest = \case

@@ -7,6 +7,7 @@ import System.Exit (die)
 import qualified DeadCleanup
 import qualified IndirectThrow
 import qualified LateRecovery
+import qualified Messages
 import qualified MutualThrow
 import qualified NestedLimits
 import qualified NurseryRaces
@@ -36,6 +37,7 @@ attacks :: [(String, IO ())]
 attacks =
   [ ("DeadCleanup", DeadCleanup.attack)
   , ("LateRecovery", LateRecovery.attack)
+  , ("Messages", Messages.attack)
   , ("MutualThrow", MutualThrow.attack)
   , ("NestedLimits", NestedLimits.attack)
   , ("NurseryRaces", NurseryRaces.attack)

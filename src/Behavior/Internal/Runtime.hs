@@ -48,6 +48,7 @@ module Behavior.Internal.Runtime
     -- * Watching
   , Event (..)
   , annotate
+  , reportUncaught
   , isRecorded
   , runClock
   , withSink
@@ -78,7 +79,7 @@ import Control.Monad (when)
 import Data.Foldable (for_)
 import Data.IORef (IORef, newIORef, readIORef, writeIORef)
 import GHC.Clock (getMonotonicTime)
-import GHC.Conc (labelThread)
+import GHC.Conc (getUncaughtExceptionHandler, labelThread)
 import GHC.IORef (atomicModifyIORef'_)
 import System.IO.Unsafe (unsafePerformIO)
 
@@ -376,6 +377,13 @@ withSink sink =
 -- | Emits the text as an event, and adds it to the simulation's record.
 annotate :: String -> IO ()
 annotate text = emit (Annotated text) >> inSimulation (pure ()) (\simulation -> record simulation (Annotated text))
+
+-- | Passes an exception, which is not thrown, to GHC's handler for uncaught exceptions. In a
+-- simulation its text is added to the record instead.
+reportUncaught :: Exception e => e -> IO ()
+reportUncaught e =
+  inSimulation (getUncaughtExceptionHandler >>= ($ toException e)) $ \simulation ->
+    record simulation (Annotated (show e))
 
 -- | Whether events belong to the record by which a run is judged. After the end of a simulated
 -- run its remaining threads are unwound; that does not belong to the record.

@@ -1,6 +1,6 @@
 -- |
--- A small kit for your own tests: a mock world of scripted actions, conditions and
--- sensors, a record of what happened in it, and claims about that record.
+-- A small kit for your own tests: a mock world of scripted actions, conditions,
+-- sensors and drivers, a record of what happened in it, and claims about that record.
 --
 -- > it "goes to its charger before the battery is empty" $ do
 -- >   world    <- newMock
@@ -55,6 +55,7 @@ module Behavior.Sim.Mock
   , reading
   , set
   , clear
+  , driver
 
     -- * The record
   , shouldRecord
@@ -101,6 +102,7 @@ module Behavior.Sim.Mock
 import Behavior.Internal.Mock.Action
 import Behavior.Internal.Mock.Claim
 import Behavior.Internal.Mock.Condition
+import Behavior.Internal.Mock.Driver
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Script

@@ -17,8 +17,7 @@ module Behavior.Internal.Mock.Condition
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (ErrorCall (..), mask_, throwIO)
-import Control.Monad (unless)
+import Control.Exception (mask_)
 import Data.Foldable (for_, traverse_)
 import Data.Maybe (isJust, listToMaybe)
 
@@ -79,8 +78,7 @@ condition mock name = partialCondition mock name . map (fmap Just)
 -- @since 0.1.0.0
 partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
 partialCondition mock name changes = do
-  -- The list may be infinite, so only its first 1000 times are checked.
-  for_ (zip (Nothing : map Just times) (take 1000 times)) $ uncurry checkTime
+  checkTimes (<) ("condition " ++ show name ++ ": the times of the changes start from zero and increase") (map fst changes)
   registerName mock "condition" name
   first <- newTVarIO (initial >>= snd)
   rest <- newTVarIO (if isJust initial then drop 1 changes else changes)
@@ -90,12 +88,6 @@ partialCondition mock name changes = do
   pure c
  where
   initial = listToMaybe [(t, a) | (t, a) <- take 1 changes, t == 0]
-  times = map fst changes
-  checkTime before t =
-    unless (maybe (t >= 0) (< t) before) . throwIO . ErrorCall $
-      "condition " ++ show name ++ ": the times of the changes start from zero and increase; "
-        ++ show t
-        ++ maybe " is no such time" (\b -> " must not come after " ++ show b) before
   kinds old new
     | fmap show old == fmap show new = []
     | otherwise = [maybe LosesValue (Becomes . show) new]

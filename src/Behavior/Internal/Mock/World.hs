@@ -19,6 +19,7 @@ module Behavior.Internal.Mock.World
   , recordEntry
   , registerName
   , registerPending
+  , checkTimes
 
     -- * The record
   , happened
@@ -28,7 +29,8 @@ module Behavior.Internal.Mock.World
 
 import Control.Concurrent.STM (STM)
 import Control.Exception (ErrorCall (..), Exception, mask_, throwIO)
-import Control.Monad (join, void, when)
+import Control.Monad (join, unless, void, when)
+import Data.Foldable (for_)
 import Data.IORef
 import Data.Maybe (fromMaybe, isNothing)
 
@@ -115,6 +117,13 @@ registerName mock kind name = do
 -- recorded yet.
 registerPending :: Mock -> (Seconds -> STM [RecordEntry]) -> IO ()
 registerPending mock due = atomicModifyIORef' (pendingChanges mock) (\old -> (due : old, ()))
+
+-- | Rejects scripted times with the given text, unless they start from zero, and each may follow the
+-- one before. (The list may be infinite: only its first 1000 times are checked.)
+checkTimes :: (Seconds -> Seconds -> Bool) -> String -> [Seconds] -> IO ()
+checkTimes mayFollow rule times = for_ (zip (Nothing : map Just times) (take 1000 times)) $ \(before, t) ->
+  unless (maybe (t >= 0) (`mayFollow` t) before) . throwIO . ErrorCall $
+    rule ++ "; " ++ show t ++ maybe " is no such time" (\b -> " must not come after " ++ show b) before
 
 -- | All that has happened until now. A change of a condition is in the record once a
 -- later entry is, or once a simulated run has reached its time, even if nothing has read

@@ -20,7 +20,7 @@ module Behavior.Internal.Reactive.Operators
   , whileHolding
   ) where
 
-import Data.List (findIndex)
+import Data.List (findIndex, intercalate, nub)
 
 import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Reactive.Engine
@@ -134,7 +134,9 @@ insteadWhen condition emergency act = react "insteadWhen" condition $ \case
 
 -- | 'rSelect' with a branch for each value of any type.
 --
--- Everything that is documented for 'rSelect' holds here too.
+-- Everything that is documented for 'rSelect' holds here too. When the value changes and changes
+-- back, the branch restarts: where a flicker must not restart it, use 'Behavior.Signal.debounce'; to
+-- give up for good, 'insteadWhen' or 'whileHolding'.
 --
 -- >>> Signal.switch (pure "dock") (\mode -> putStrLn ("in mode " ++ mode))
 -- in mode dock
@@ -175,20 +177,33 @@ waitUntil condition = react "waitUntil" condition $ \case
   True -> Conclude (pure ())
   False -> Idle
 
--- | Runs the behaviour while the condition holds, and fails if the condition does not
+-- | A guard: runs the behaviour while the condition holds, and fails if the condition does not
 -- hold, at the start or later.
 --
+-- > whileHolding c act ? recovery     -- a guard with a recovery, which also runs when act fails
+--
 -- [Result] The behaviour's, also if it completed although its stop was requested.
--- [Failure] When the condition does not hold: a 'Behavior.FailedBecause' with that reason. The
---   behaviour's own failure, also while it is being stopped, is thrown instead.
+-- [Failure] When the condition does not hold: a 'Behavior.FailedBecause' with that reason, and the
+--   condition's name if it has one ('Behavior.Signal.named'). The behaviour's own failure, also
+--   while it is being stopped, is thrown instead.
 -- [Fault] Of the behaviour or the condition, also while stopping: thrown.
 -- [Cancellation] Requests the stop of everything together; returns after everything has ended.
 --
--- >>> Signal.whileHolding (pure False) (putStrLn "grip") ? putStrLn "lost it"
--- lost it
+-- >>> let holds = Signal.named "gripper closed" (pure False)
+-- >>> fallbackWith (Signal.whileHolding holds (putStrLn "carry")) print
+-- FailedBecause "the condition does not hold: gripper closed"
 --
 -- @since 0.1.0.0
 whileHolding :: Signal Bool -> Behavior a -> Behavior a
-whileHolding condition behavior = react "whileHolding" condition $ \case
-  True -> Run "branch" behavior
-  False -> Conclude (failWith "the condition does not hold")
+whileHolding condition behavior = react "whileHolding" (orReason condition) $ \case
+  Nothing -> Run "branch" behavior
+  Just reason -> Conclude (failWith reason)
+
+-- | Nothing while the condition holds; otherwise the reason why a guard fails.
+orReason :: Signal Bool -> Signal (Maybe String)
+orReason condition = Signal $ \demand -> do
+  source <- open condition (demand `contramapDemand` reason [])
+  pure (reason (nub (names source)) <$> source)
+ where
+  reason _ True = Nothing
+  reason these False = Just (intercalate ": " ("the condition does not hold" : [intercalate ", " these | not (null these)]))

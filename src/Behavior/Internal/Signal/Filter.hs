@@ -1,13 +1,17 @@
 {-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Signals that ignore brief or small changes.
+-- Signals that ignore changes which are brief, small or too frequent, count them, or judge their age.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Signal.Filter
   ( debounce
+  , throttle
   , hysteresis
+  , changes
+  , olderThan
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -64,6 +68,81 @@ debounce seconds signal = Signal $ \demand -> do
         view = mapView (*> (readTVar settled >>= maybe retry pure)) <$> view source
       }
 
+-- | Limits the rate of changes: the first value counts at once, and so does each change, unless the
+-- one before it was less than the given number of seconds ago (zero or more). Then the signal keeps
+-- its value until that time has passed, and takes the one that is then the latest.
+--
+-- So no change comes to the operator too soon after another, and the last one always comes. Like that of
+-- 'debounce', its memory begins afresh after a time when it was not watched. In an operator that
+-- restarts its branch at each change, it bounds how often:
+--
+-- > planner ||| Signal.switch (Signal.throttle 5 path) fly
+--
+-- >>> Signal.waitUntil (Signal.throttle 0.5 (pure True))
+--
+-- @since 0.1.0.0
+throttle :: Eq a => Seconds -> Signal a -> Signal a
+throttle seconds signal = Signal $ \demand -> do
+  _ <- duration "throttle" seconds
+  source <- open (suppressEqual signal) demand
+  passed <- newTVarIO Nothing
+  let passOn value = forever $ do
+        atomically $ do
+          new <- Just <$> value
+          old <- readTVar passed
+          check (new /= old)
+          writeTVar passed new
+        sleep seconds
+  pure
+    source
+      { workers =
+          workers source
+            ++ [Worker "throttle" (writeTVar passed Nothing >> const . passOn . ignoreErrors <$> view source)]
+      , -- The source is read here too, so that what it throws is thrown.
+        view = mapView (*> (readTVar passed >>= maybe retry pure)) <$> view source
+      }
+
+-- | Whether the time that the signal gives (on the clock of 'Behavior.Time.now') is at least the given
+-- number of seconds ago (zero or more): how to require that a reading is not too old.
+--
+-- > Signal.whileHolding (not \<$\> Signal.olderThan 0.5 (stamp \<$\> scan)) drive
+--
+-- The driver stores a reading together with its time; a polled sensor does with
+-- @polling 0.1 ((,) \<$\> now \<*\> readScan)@. A time that is NaN is a fault. Unlike 'staleAfter' this
+-- gives a condition, works with every signal, and goes by the time of the last reading that there is.
+--
+-- >>> stamp <- now
+-- >>> Signal.waitUntil (Signal.olderThan 0.01 (pure stamp))
+--
+-- @since 0.1.0.0
+olderThan :: Seconds -> Signal Seconds -> Signal Bool
+olderThan seconds signal = Signal $ \demand -> do
+  _ <- duration "olderThan" seconds
+  source <- open (suppressEqual signal) everyValue {readingTimes = readingTimes demand}
+  -- A time, and whether it is too old.
+  judged <- newTVarIO Nothing
+  let judge value = forever $ do
+        time <- atomically $ do
+          v <- value
+          known <- readTVar judged
+          v <$ check (known /= Just (v, True))
+        t <- now
+        let tooOld = time + seconds <= t
+        atomically (writeTVar judged (Just (time, tooOld)))
+        unless tooOld (sleepUntil (time + seconds))
+      judgement value = do
+        v <- value
+        readTVar judged >>= \case
+          Just (time, tooOld)
+            | v == time -> pure tooOld
+            | v > time && not tooOld -> pure False
+          _ -> retry
+  pure
+    source
+      { workers = workers source ++ [Worker "olderThan" (writeTVar judged Nothing >> const . judge . ignoreErrors <$> view source)]
+      , view = mapView judgement <$> view source
+      }
+
 -- | A Schmitt trigger: @hysteresis initial low high signal@ becomes true when the signal
 -- reaches @high@, and false when it falls to @low@; in between it keeps its value, which
 -- is @initial@ at first.
@@ -84,12 +163,41 @@ hysteresis :: Ord a => Bool -> a -> a -> Signal a -> Signal Bool
 hysteresis initial low high signal = Signal $ \demand -> do
   unless (low <= high) . throwIO . ErrorCall $
     "hysteresis: the lower threshold must be at most the upper one"
+  open (accumulate "hysteresis" initial (\before v -> v >= high || (before && v > low)) signal) demand
+
+-- | How often the signal has changed since the operator began: 0 at first. A signal that is true for
+-- an instant is easily missed; this one stays changed.
+--
+-- > waitUntil ((> 0) \<$\> changes s)     -- waits for a change from now on
+--
+-- A change that is undone before it is seen is not counted, and what changes while it is not watched
+-- (as during a recovery) is one change, or none. Like the memory of 'hysteresis', the count lasts for
+-- the operator's whole run.
+--
+-- >>> import Behavior.STM (newTVarIO, readTVar, writeTVar)
+-- >>> goal <- newTVarIO "kitchen"
+-- >>> let next = sleep 0.01 >> atomically (writeTVar goal "garden")
+-- >>> Signal.waitUntil ((> 0) <$> Signal.changes (Signal.watching (readTVar goal))) `both` next
+--
+-- @since 0.1.0.0
+changes :: Eq a => Signal a -> Signal Int
+changes signal = maybe 0 snd <$> accumulate "changes" Nothing (\before -> Just . next before) signal
+ where
+  next Nothing v = (v, 0)
+  next (Just (old, n)) v
+    | v == old = (old, n)
+    | otherwise = (,) v $! n + 1
+
+-- | The state that each value of the signal leads to, from the state before it. The memory lasts for
+-- the operator's whole run.
+accumulate :: (Eq a, Eq s) => String -> s -> (s -> a -> s) -> Signal a -> Signal s
+accumulate name initial next signal = Signal $ \demand -> do
   source <- open (suppressEqual signal) everyValue {readingTimes = readingTimes demand}
   memory <- newTVarIO initial
   let state value = do
         v <- value
         before <- readTVar memory
-        let after = v >= high || (before && v > low)
+        let after = next before v
         when (after /= before) (writeTVar memory after)
         pure after
       -- A new state that a read computes is kept if the operator acts on it, in the same
@@ -101,7 +209,7 @@ hysteresis initial low high signal = Signal $ \demand -> do
         check (after /= before)
   pure
     source
-      { workers = workers source ++ [Worker "hysteresis" (const . remember . ignoreErrors <$> view source)]
+      { workers = workers source ++ [Worker name (const . remember . ignoreErrors <$> view source)]
       , view = mapView state <$> view source
       }
 

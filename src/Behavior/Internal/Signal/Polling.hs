@@ -100,6 +100,7 @@ polling every act = Signal $ \demand -> do
               Just (generation, read') | generation >= n -> either throwSTM pure read'
               _ -> retry
       , inFlightSince = readTVar inFlight
+      , names = []
       }
 
 -- | The value that was last published for a sensor, and its generation.

@@ -9,6 +9,7 @@ module Behavior.Internal.Signal.Source
   ( -- * Signals
     Signal (..)
   , watching
+  , named
 
     -- * Opening
   , Demand (..)
@@ -97,11 +98,13 @@ data Source a = Source
   -- ^ A view of the values that are obtained from this moment on.
   , inFlightSince :: STM (Maybe Seconds)
   -- ^ When the oldest reading in flight began, if that was demanded.
+  , names :: [String]
+  -- ^ The names of the signals that it is made of, from left to right.
   }
 
 -- | The source that gives this view, and needs no worker.
 fromView :: STM (View a) -> Source a
-fromView it = Source {workers = [], view = it, inFlightSince = pure Nothing}
+fromView it = Source {workers = [], view = it, inFlightSince = pure Nothing, names = []}
 
 instance Functor Source where
   fmap f source = source {view = fmap f <$> view source}
@@ -113,6 +116,7 @@ instance Applicative Source where
       { workers = workers f ++ workers a
       , view = (<*>) <$> view f <*> view a
       , inFlightSince = earliest <$> inFlightSince f <*> inFlightSince a
+      , names = names f ++ names a
       }
    where
     earliest (Just s) (Just t) = Just (min s t)
@@ -175,6 +179,19 @@ watching :: STM a -> Signal a
 watching transaction = Signal . const . pure . fromView . pure $ View transaction (transaction `orElse` noValueAnyMore)
  where
   noValueAnyMore = failWith "the signal has no value any more"
+
+-- | Gives the signal a name, which 'Behavior.Signal.whileHolding' reports when it ends a behaviour.
+-- What is made of the signal (by 'fmap', a filter, ...) has that name too, unless it gets its own.
+--
+-- >>> let wind = Signal.named "wind" (pure (12 :: Int))
+-- >>> Signal.whileHolding ((< 10) <$> wind) (putStrLn "fly")
+-- *** Exception: FailedBecause "the condition does not hold: wind"
+-- >>> Signal.whileHolding (Signal.named "calm" ((< 10) <$> wind)) (putStrLn "fly")
+-- *** Exception: FailedBecause "the condition does not hold: calm"
+--
+-- @since 0.1.0.0
+named :: String -> Signal a -> Signal a
+named name signal = Signal (fmap (\source -> source {names = [name]}) . open signal)
 
 -- | The threads that run for a source, from left to right.
 type Sensors = [Branch ()]

@@ -1,0 +1,57 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
+-- |
+-- Scripted drivers, which deliver messages by calling back.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Mock.Driver (driver) where
+
+import Control.Exception (AsyncException (..), fromException, mask_, throwIO, uninterruptibleMask_)
+import Control.Monad (unless)
+import Data.Foldable (for_)
+
+import Behavior.Internal.Mock.World
+import Behavior.Internal.Runtime
+
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Message
+-- >>> import Behavior.Sim.Mock
+-- >>> import Behavior.Time
+-- >>> mock <- newMock
+
+-- | Makes a driver with the given name, which delivers messages at the given times: in seconds since
+-- the clock of the world was started (see 'begin'). It is a function for
+-- 'Behavior.Message.withInbox': it takes the callback, and returns the action that ends the
+-- subscription.
+--
+-- The times are zero or more, and do not decrease. A subscription delivers what is due after it has
+-- begun, from a thread of its own. The record has a note for each message and for the subscription's
+-- beginning and end: @orders: \"tea\"@, @orders: subscribed@, @orders: unsubscribed@.
+--
+-- Times that decrease, or a name that is already used in this world, are rejected with an
+-- 'Control.Exception.ErrorCall'. What the callback throws, the end of the subscription throws.
+--
+-- >>> orders <- driver mock "orders" [(0.001, "tea"), (0.002, "milk")]
+-- >>> withInbox 10 orders $ \inbox -> (,) <$> atomically (receive inbox) <*> atomically (receive inbox)
+-- ("tea","milk")
+-- >>> mock `shouldRecord` comesBefore (noted "orders: \"milk\"") (noted "orders: unsubscribed")
+--
+-- @since 0.1.0.0
+driver :: Show e => Mock -> String -> [(Seconds, e)] -> IO ((e -> IO ()) -> IO (IO ()))
+driver mock name messages = do
+  checkTimes (<=) ("driver " ++ show name ++ ": the times of the messages start from zero and do not decrease") (map fst messages)
+  registerName mock "driver" name
+  pure $ \deliver -> do
+    (zero, t) <- clock mock
+    let due = dropWhile ((< t - zero) . fst) messages
+    saying "subscribed"
+    thread <- mask_ . start (Label "driver" name) . for_ due $ \(at, e) ->
+      sleepUntil (zero + at) >> saying (show e) >> deliver e
+    pure . uninterruptibleMask_ $ do
+      interrupt (threadId thread) ThreadKilled
+      end <- atomically (threadEnd thread)
+      saying "unsubscribed"
+      either (\e -> unless (fromException e == Just ThreadKilled) (throwIO e)) pure end
+ where
+  saying what = note mock (name ++ ": " ++ what)
