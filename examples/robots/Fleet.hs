@@ -1,7 +1,7 @@
 -- |
--- Robots that take orders from one queue and share a few chargers. Each order is handed over once,
--- whatever happens to the robots: a robot that faults or is withdrawn gives its order back, and
--- frees its charger.
+-- Robots that take orders from one inbox and share a few chargers. Each order is handed over once,
+-- whatever happens to the robots: the order of a robot that faults or is withdrawn waits for another
+-- one, and its charger is freed.
 module Fleet
   ( Fleet (..)
   , Robot (..)
@@ -9,10 +9,11 @@ module Fleet
   , fleet
   ) where
 
-import Control.Exception (bracket_, displayException, finally, mask)
+import Control.Exception (bracket_, displayException, mask)
 import Control.Monad (forever, void)
 
 import Behavior
+import Behavior.Message
 import qualified Behavior.Parallel as Parallel
 import Behavior.STM
 import Behavior.Signal (Signal)
@@ -22,7 +23,7 @@ type Order = Int
 
 -- | What the robots share.
 data Fleet = Fleet
-  { orders :: TQueue Order
+  { orders :: Inbox Order
   , freeChargers :: TVar Int
   , logLine :: String -> Behavior ()
   }
@@ -50,20 +51,16 @@ fleet shared robots = do
     Signal.insteadWhen (withdrawn robot) (logLine shared (name robot ++ " is withdrawn")) (work shared robot)
       `catchAny` \fault -> logLine shared (name robot ++ " is out of service: " ++ displayException fault)
 
--- | Takes orders and carries them out. An order is in the queue, or in the variable of one robot,
--- or handed over; each step from one to the next is one transaction or is masked, so no
--- interruption can lose the order there, or have it done twice.
+-- | Takes orders and carries them out. An order that is interrupted, by the battery or for good, waits
+-- again in its old place, for this robot or another. The drive can be interrupted. The mask keeps an
+-- interruption from coming between the hand-over and the end of the order.
 work :: Fleet -> Robot -> Behavior ()
-work shared robot = do
-  mine <- newTVarIO []
-  let takeOrder = atomically (readTQueue (orders shared) >>= \order -> writeTVar mine [order])
-      giveBack = atomically (swapTVar mine [] >>= mapM_ (unGetTQueue (orders shared)))
-      -- After an interruption, the robot goes on with the order that it has.
-      finishMine = mask $ \restore -> resumable mine $ \order -> do
-        restore (carry robot order)
-        handOver robot order
-  Signal.monitor (batteryLow robot) (recharge shared robot) (forever (finishMine >> takeOrder))
-    `finally` giveBack
+work shared robot = Signal.monitor (batteryLow robot) (recharge shared robot) (forever oneOrder)
+ where
+  oneOrder = mask $ \restore -> handleNext (orders shared) $ \order -> do
+    restore (carry robot order)
+    handOver robot order
+    pure (pure ())
 
 -- | Waits for a free charger, and frees it again, however the charging ends.
 recharge :: Fleet -> Robot -> Behavior ()

@@ -12,7 +12,8 @@ import System.IO (BufferMode (..), hPutStrLn, hSetBuffering, stderr, stdout)
 import Behavior
 import Behavior.STM
 import qualified Behavior.Signal as Signal
-import Behavior.Sim.Mock (begin, condition, newMock, set, signal)
+import Behavior.Message (withInbox)
+import Behavior.Sim.Mock (begin, condition, driver, newMock, set, signal)
 import Drone (Drone (Drone), drone)
 import qualified Drone
 import Fleet (Fleet (Fleet), Robot (Robot), fleet)
@@ -115,10 +116,9 @@ droneDemo = do
 fleetDemo :: Behavior ()
 fleetDemo = do
   world <- newMock
-  queue <- newTQueueIO
+  orders <- driver world "orders" [(0.1, n) | n <- [1 .. 6]]
   chargers <- newTVarIO 1
   handedOver <- newTVarIO (0 :: Int)
-  atomically (mapM_ (writeTQueue queue) [1 .. 6])
   let robot who lowAt = do
         low <- condition world (who ++ ": battery low") [(0, False), (lowAt, True)]
         pure
@@ -136,5 +136,6 @@ fleetDemo = do
             }
   robots <- traverse (uncurry robot) [("Ann", 1.4), ("Bo", 60), ("Cid", 1.5)]
   begin world
-  Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver))
-    ||| fleet Fleet {Fleet.orders = queue, Fleet.freeChargers = chargers, Fleet.logLine = putStrLn} robots
+  withInbox 10 orders $ \inbox ->
+    Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver))
+      ||| fleet Fleet {Fleet.orders = inbox, Fleet.freeChargers = chargers, Fleet.logLine = putStrLn} robots

@@ -5,11 +5,12 @@
 -- another one as it hands over its order, and two have faults.
 module Examples.FleetSpec (spec) where
 
-import Control.Exception (bracketOnError, mask, onException)
+import Control.Exception (mask)
 import Control.Monad (forever, void)
 import Test.Hspec
 
 import Behavior
+import Behavior.Message
 import qualified Behavior.Parallel as Parallel
 import Behavior.STM
 import Behavior.Sim.Mock
@@ -28,19 +29,17 @@ spec = guarded $ do
   it "and robots that take an order and then protect it lose one" $
     failsWith "It was so 0 times" 500 (day worst "returned" once (each takeThenProtect))
   it "and robots that can be interrupted as they hand over an order do it twice" $
-    failsWith "It was so 2 times" 500 (day worst "returned" once (each takeInBracket))
+    failsWith "It was so 2 times" 500 (day worst "returned" once (each unprotected))
  where
   once = foldMap (\order -> exactly 1 (successOf ("hand over " ++ show order))) [1 .. 6 :: Order]
   each serve shared robots = void (Parallel.allOf [forever (serve shared robot) `outOfService` robot | robot <- robots])
   outOfService act robot = Signal.insteadWhen (withdrawn robot) (pure ()) act `catchAny` \_ -> pure ()
   takeThenProtect shared robot = do
-    order <- atomically (readTQueue (orders shared))
+    order <- atomically (receive (orders shared))
     logLine shared (name robot ++ " has an order")
-    mask (\restore -> restore (carry robot order) >> handOver robot order) `onException` giveBack shared order
-  takeInBracket shared robot =
-    bracketOnError (atomically (readTQueue (orders shared))) (giveBack shared) $ \order ->
-      carry robot order >> handOver robot order
-  giveBack shared order = atomically (unGetTQueue (orders shared) order)
+    mask (\restore -> restore (carry robot order) >> handOver robot order)
+  unprotected shared robot =
+    handleNext (orders shared) (\order -> carry robot order >> handOver robot order >> pure (pure ()))
 
 -- | What happens to one robot: at which times its battery becomes low and it is withdrawn.
 data Story = Story
@@ -66,7 +65,7 @@ worst =
 day :: [Story] -> String -> Claim -> (Fleet -> [Robot] -> Behavior ()) -> Day
 day stories end claim serve simulated = do
   world <- newMock
-  queue <- newTQueueIO
+  newOrders <- driver world "orders" [(5, order) | order <- [1 .. 6]]
   chargers <- newTVarIO 1
   done <- newTVarIO (0 :: Int)
   carries <- actionOn world "carry" $ \(called, _order :: Order) -> [carrying s `slowToStop` 0.5 | s <- stories, who s == called]
@@ -85,12 +84,10 @@ day stories end claim serve simulated = do
             , batteryLow = signal low
             , withdrawn = signal gone
             }
-      sixOrders = do
-        sleep 5
-        atomically (mapM_ (writeTQueue queue) [1 .. 6])
-        atomically (readTVar done >>= check . (== 6))
+      sixOrders = atomically (readTVar done >>= check . (== 6))
   robots <- traverse robot stories
-  run <- simulated (serve Fleet {orders = queue, freeChargers = chargers, logLine = const checkpoint} robots ||| sixOrders)
+  run <- simulated . withInbox 10 newOrders $ \inbox ->
+    serve Fleet {orders = inbox, freeChargers = chargers, logLine = const checkpoint} robots ||| sixOrders
   world `shouldRecord` claim
   world `shouldRecord` never (running "charge" `overlapping` running "charge")
   ended run `shouldBe` end

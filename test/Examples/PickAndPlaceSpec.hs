@@ -23,7 +23,7 @@ spec = guarded $ do
   it "gives up when the part has slipped twice" $
     inOneRun (day [3, 7] 60 (exactly 2 (startOf "move to Box") <> never (successOf "move to Box")) pickAndPlace)
   it "takes a position on which two of three detectors agree" $ do
-    let located positions = ended <$> simulate (locate positions >>= \position -> when (position /= 2.5) (failWith (show position)))
+    let located found = fmap ended . simulate $ locate found >>= \position -> when (position /= 2.5) (failWith (show position))
     located [pure 2, Time.sleep 1 >> pure 3, Time.sleep 3600 >> pure 2] `shouldReturn` "returned"
     located [pure 7, failWith "dark", pure 2] `shouldReturn` "failure: FailedBecause \"no two detectors agree\""
   it "never moves while the gripper moves, and ends parked, whenever it is cancelled" $

@@ -4,6 +4,7 @@ module Main (main) where
 import System.Environment (getArgs)
 import System.Exit (die)
 
+import qualified Abandons
 import qualified DeadCleanup
 import qualified IndirectThrow
 import qualified LateRecovery
@@ -35,7 +36,8 @@ main = do
 
 attacks :: [(String, IO ())]
 attacks =
-  [ ("DeadCleanup", DeadCleanup.attack)
+  [ ("Abandons", Abandons.attack)
+  , ("DeadCleanup", DeadCleanup.attack)
   , ("LateRecovery", LateRecovery.attack)
   , ("Messages", Messages.attack)
   , ("MutualThrow", MutualThrow.attack)

@@ -11,7 +11,7 @@ module Behavior.Internal.Abandoning
   , Abandoned (..)
   ) where
 
-import Control.Exception (Exception (..), SomeException, onException)
+import Control.Exception (Exception (..), SomeException, mask, onException)
 import Control.Monad (unless, void)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
 import System.IO.Unsafe (unsafePerformIO)
@@ -59,9 +59,11 @@ import Behavior.Internal.Seconds (duration)
 abandoning :: Seconds -> Behavior a -> Behavior a
 abandoning seconds act = do
   limit <- duration "abandoning" seconds
-  structured $ \scope -> do
+  -- Masked, so that no exception comes before the handler is in place: without it 'structured' would
+  -- wait for the branch.
+  structured $ \scope -> mask $ \restore -> do
     acting <- branch scope (Label "abandoning" "branch") act
-    (outcomeToIO <$> awaitOutcome acting) `onException` stopWithin limit scope acting
+    restore (outcomeToIO <$> awaitOutcome acting) `onException` stopWithin limit scope acting
 
 -- | Requests the stop of the branch, and waits for it; when the time is up, takes it out of the scope.
 stopWithin :: Seconds -> Scope -> Branch a -> IO ()

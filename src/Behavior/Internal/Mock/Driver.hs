@@ -26,7 +26,8 @@ import Behavior.Internal.Runtime
 -- subscription.
 --
 -- The times are zero or more, and do not decrease. A subscription delivers what is due after it has
--- begun, from a thread of its own. The record has a note for each message and for the subscription's
+-- begun (on real threads, not what is due at 0, if the clock has been started before), from a thread
+-- of its own. The record has a note for each message and for the subscription's
 -- beginning and end: @orders: \"tea\"@, @orders: subscribed@, @orders: unsubscribed@.
 --
 -- Times that decrease, or a name that is already used in this world, are rejected with an
