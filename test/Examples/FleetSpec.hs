@@ -23,13 +23,13 @@ import Support (guarded)
 spec :: Spec
 spec = guarded $ do
   it "hands over each order once, and frees each charger, on its worst day" $
-    survives 500 (day worst "returned" once fleet)
+    survives 300 (day worst "returned" once fleet)
   it "fails when no robot is left, and keeps the orders" $
     survives 100 (day [quiet "Bo" [5], quiet "Ed" [5]] "failure: FailedBecause \"no robot is left\"" (never (successOf "hand over")) fleet)
   it "and robots that take an order and then protect it lose one" $
-    failsWith "It was so 0 times" 500 (day worst "returned" once (each takeThenProtect))
+    failsWith "It was so 0 times" 200 (day worst "returned" once (each takeThenProtect))
   it "and robots that can be interrupted as they hand over an order do it twice" $
-    failsWith "It was so 2 times" 500 (day worst "returned" once (each unprotected))
+    failsWith "It was so 2 times" 300 (day worst "returned" once (each unprotected))
  where
   once = foldMap (\order -> exactly 1 (successOf ("hand over " ++ show order))) [1 .. 6 :: Order]
   each serve shared robots = void (Parallel.allOf [forever (serve shared robot) `outOfService` robot | robot <- robots])
