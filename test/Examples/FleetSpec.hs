@@ -52,13 +52,13 @@ quiet :: String -> [Seconds] -> Story
 quiet called gone = Story {who = called, lowAt = [], withdrawnAt = gone, carrying = succeeds `taking` 3, charging = succeeds `taking` 2}
 
 -- | The orders come after 5 seconds, and the first ones are handed over after 8. In the end Ann is
--- the only one that works.
+-- the only one that works, and her battery becomes low each time when she hands over an order.
 worst :: [Story]
 worst =
-  [ (quiet "Ann" []) {lowAt = [6, 12]}
+  [ (quiet "Ann" []) {lowAt = [8, 13, 18]}
   , quiet "Bo" [5]
   , (quiet "Cid" []) {lowAt = [6], charging = faults "short circuit" `taking` 2}
-  , (quiet "Di" []) {carrying = faults "a wheel is lost" `taking` 3}
+  , (quiet "Di" []) {lowAt = [6], carrying = faults "a wheel is lost" `taking` 3}
   , quiet "Ed" [8]
   ]
 
