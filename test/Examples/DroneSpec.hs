@@ -36,11 +36,11 @@ spec = guarded $ do
     for_ [0.5, 1, 4, 4.25, 8.5, 10, 10.5, 11.5] $ \moment ->
       survives 50 (day calm {cancelledAt = moment} "returned" drone mempty)
   it "and a drone for which landing is an emergency does not" $
-    failsWith "exactly 1 times \"land\" begins" 300 (day calm {windAt = 11.5} "returned" landingInFlight mempty)
+    failsWith "exactly 1 times \"land\" begins" 50 (day calm {windAt = 11.5} "returned" landingInFlight mempty)
   it "and a drone whose landing can be stopped does not" $
-    failsWith "\"land\" is done" 300 (day calm {cancelledAt = 11.5} "returned" stoppable mempty)
+    failsWith "\"land\" is done" 50 (day calm {cancelledAt = 11.5} "returned" stoppable mempty)
   it "and a drone that lands only after a flight without faults does not" $
-    failsWith "\"land\"" 300 (day worst "fault: the driver has crashed" landingAfterwards mempty)
+    failsWith "\"land\"" 50 (day worst "fault: the driver has crashed" landingAfterwards mempty)
  where
   worst = calm {windAt = 7, lowAt = 7, limit = 6, crashes = True}
   landingInFlight robot =

@@ -24,7 +24,7 @@ spec = guarded $ do
     failsWith "\"report" 300 . worstDay 6 . interrupted $ \robot ahead ->
       resumable ahead (visit robot) >> atomically (writeTVar ahead (waypoints robot))
   it "and a robot that begins its round again after charging does not" $
-    failsWith "\"report" 300 . worstDay 6 . interrupted $ \robot _ ->
+    failsWith "\"report" 50 . worstDay 6 . interrupted $ \robot _ ->
       for_ (waypoints robot) (visit robot)
  where
   visit robot place = driveTo robot place >> report robot place

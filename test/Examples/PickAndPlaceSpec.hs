@@ -30,10 +30,10 @@ spec = guarded $ do
     for_ moments $ \moment ->
       survives 30 (day [3, 7] moment mempty pickAndPlace)
   it "and an arm whose parking can be stopped does not" $
-    failsWith "exactly 1 times \"park\" is done" 300 . day [3, 7] 7.75 mempty $ \arm ->
+    failsWith "exactly 1 times \"park\" is done" 50 . day [3, 7] 7.75 mempty $ \arm ->
       pickAndPlace arm {park = pure ()} `finally` park arm
   it "and an arm that reacts to a slip in another branch, before it has stopped, does not" $
-    failsWith "never \"gripper\" is running while \"move to\" is running" 300 (day [1] 60 mempty reactingBeside)
+    failsWith "never \"gripper\" is running while \"move to\" is running" 50 (day [1] 60 mempty reactingBeside)
  where
   -- In the middle of each step, and when the part slips, the arm stops or parks.
   moments = [0.25, 0.75, 1.125, 1.5, 1.875, 2, 2.5, 3, 3.25, 3.5, 4.25, 5.5, 6, 7, 7.25, 7.5, 7.75]

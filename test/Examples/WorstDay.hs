@@ -1,5 +1,3 @@
-{-# LANGUAGE LambdaCase #-}
-
 -- |
 -- What the specs of the four robots share: a property of a robot that is run under many schedules.
 module Examples.WorstDay
@@ -11,6 +9,7 @@ module Examples.WorstDay
   ) where
 
 import Control.Monad (unless, void)
+import Data.IORef (modifyIORef, newIORef, readIORef)
 import Data.List (isInfixOf)
 import Test.Hspec
 
@@ -26,13 +25,16 @@ survives :: Int -> Day -> Expectation
 survives n day = void (explore (plan n) day)
 
 -- | Under one of the given number of random schedules the day has a bad end, with this in its text.
+-- (The bad ends are collected here, and not thrown to 'explore': it would shrink the schedule, which
+-- takes longer than all the rest.)
 failsWith :: String -> Int -> Day -> Expectation
-failsWith why n day =
-  tryExplore (plan n) day >>= \case
-    Right report -> expectationFailure ("the wrong version is not rejected: " ++ show report)
-    Left counterexample ->
-      unless (why `isInfixOf` asHspec (reason counterexample)) $
-        expectationFailure ("it is rejected for another reason:\n" ++ show counterexample)
+failsWith why n day = do
+  badEnds <- newIORef []
+  report <- explore (plan n) $ \simulated ->
+    tryAny (day simulated) >>= either (\e -> modifyIORef badEnds (asHspec e :)) pure
+  found <- readIORef badEnds
+  unless (any (why `isInfixOf`) found) $
+    expectationFailure (unlines ("the wrong version is not rejected for this reason:" : show report : take 1 found))
 
 plan :: Int -> Plan
 plan n = (randomly n `endingAt` 1000) {showException = asHspec}
