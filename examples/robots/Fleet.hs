@@ -24,7 +24,7 @@ type Order = Int
 -- | What the robots share.
 data Fleet = Fleet
   { orders :: Inbox Order
-  , freeChargers :: TVar Int
+  , chargers :: TSem
   , logLine :: String -> Behavior ()
   }
 
@@ -64,10 +64,5 @@ work shared robot = Signal.monitor (batteryLow robot) (recharge shared robot) (f
 
 -- | Waits for a free charger, and frees it again, however the charging ends.
 recharge :: Fleet -> Robot -> Behavior ()
-recharge shared robot = bracket_ takeCharger freeCharger (charge robot)
- where
-  takeCharger = atomically $ do
-    free <- readTVar (freeChargers shared)
-    check (free > 0)
-    writeTVar (freeChargers shared) (free - 1)
-  freeCharger = atomically (modifyTVar' (freeChargers shared) (+ 1))
+recharge shared robot =
+  bracket_ (atomically (waitTSem (chargers shared))) (atomically (signalTSem (chargers shared))) (charge robot)

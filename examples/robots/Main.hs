@@ -117,7 +117,7 @@ fleetDemo :: Behavior ()
 fleetDemo = do
   world <- newMock
   orders <- driver world "orders" [(0.1, n) | n <- [1 .. 6]]
-  chargers <- newTVarIO 1
+  chargers <- atomically (newTSem 1)
   handedOver <- newTVarIO (0 :: Int)
   let robot who lowAt = do
         low <- condition world (who ++ ": battery low") [(0, False), (lowAt, True)]
@@ -138,4 +138,4 @@ fleetDemo = do
   begin world
   withInbox 10 orders $ \inbox ->
     Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver))
-      ||| fleet Fleet {Fleet.orders = inbox, Fleet.freeChargers = chargers, Fleet.logLine = putStrLn} robots
+      ||| fleet Fleet {Fleet.orders = inbox, Fleet.chargers = chargers, Fleet.logLine = putStrLn} robots

@@ -4,8 +4,8 @@
 -- Transactional variables: all of the package stm, with this library's 'atomically'; and 'resumable',
 -- which keeps its place in one.
 --
--- Import this module in place of "Control.Concurrent.STM": it exports everything of that except
--- @registerDelay@, whose time cannot be simulated ('Behavior.Time.sleep' and
+-- Import this module in place of "Control.Concurrent.STM" and "Control.Concurrent.STM.TSem": it exports
+-- everything of those except @registerDelay@, whose time cannot be simulated ('Behavior.Time.sleep' and
 -- 'Behavior.Time.timeout' can be). The @atomically@ of stm works, too, unless the behaviour is
 -- simulated ("Behavior.Sim"): the simulator cannot see a thread that blocks in it.
 --
@@ -20,10 +20,12 @@ module Behavior.STM
 #ifndef __HADDOCK_VERSION__
     -- Haddock would list the whole package here.
   , module Control.Concurrent.STM
+  , module Control.Concurrent.STM.TSem
 #endif
   ) where
 
 import Control.Concurrent.STM hiding (atomically, registerDelay)
+import Control.Concurrent.STM.TSem
 
 import Behavior.Internal.Resumable (resumable)
 import Behavior.Internal.Runtime (atomically)

@@ -66,7 +66,7 @@ day :: [Story] -> String -> Claim -> (Fleet -> [Robot] -> Behavior ()) -> Day
 day stories end claim serve simulated = do
   world <- newMock
   newOrders <- driver world "orders" [(5, order) | order <- [1 .. 6]]
-  chargers <- newTVarIO 1
+  free <- atomically (newTSem 1)
   done <- newTVarIO (0 :: Int)
   carries <- actionOn world "carry" $ \(called, _order :: Order) -> [carrying s `slowToStop` 0.5 | s <- stories, who s == called]
   hands <- actionOn world "hand over" (const [succeeds `causing` atomically (modifyTVar' done (+ 1))])
@@ -87,8 +87,8 @@ day stories end claim serve simulated = do
       sixOrders = atomically (readTVar done >>= check . (== 6))
   robots <- traverse robot stories
   run <- simulated . withInbox 10 newOrders $ \inbox ->
-    serve Fleet {orders = inbox, freeChargers = chargers, logLine = const checkpoint} robots ||| sixOrders
+    serve Fleet {orders = inbox, chargers = free, logLine = const checkpoint} robots ||| sixOrders
   world `shouldRecord` claim
   world `shouldRecord` never (running "charge" `overlapping` running "charge")
   ended run `shouldBe` end
-  readTVarIO chargers `shouldReturn` 1
+  atomically ((True <$ waitTSem free) `orElse` pure False) `shouldReturn` True

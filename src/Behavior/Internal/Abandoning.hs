@@ -52,7 +52,7 @@ import Behavior.Internal.Seconds (duration)
 --
 -- A negative number or NaN is refused with an 'Control.Exception.ErrorCall' (a fault).
 --
--- >>> timeout 0.01 (abandoning 0.01 (sleep 3600)) ? putStrLn "land"
+-- >>> timeout 0.01 (abandoning 1 (sleep 3600)) ? putStrLn "land"
 -- land
 --
 -- @since 0.1.0.0

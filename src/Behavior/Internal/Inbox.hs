@@ -126,6 +126,11 @@ onMessage inbox handle task = react "onMessage" (watching ((> 0) <$> waiting inb
 -- [Cancellation] Passes through; the message waits again. The handler runs in the caller's thread
 --   and masking state; the transaction is committed masked, and can be interrupted while it retries.
 --
+-- An effect outside of variables which must not be repeated, is the last step, does not block after its
+-- effect, and is masked, so that nothing comes between it and the commit:
+--
+-- > mask $ \restore -> handleNext inbox (\order -> restore (carry order) >> handOver order >> pure (pure ()))
+--
 -- >>> let orders deliver = pure () <$ for_ ["tea", "milk"] deliver
 -- >>> let serve order = if order == "tea" then failWith "no tea" else pure (pure order)
 -- >>> withInbox 10 orders $ \inbox -> (handleNext inbox serve ? pure "sorry") >> atomically (receive inbox)

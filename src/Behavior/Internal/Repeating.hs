@@ -16,6 +16,7 @@ import Behavior.Internal.Seconds
 
 -- $setup
 -- >>> import Behavior
+-- >>> import Behavior.Sim (simulate)
 -- >>> import Behavior.Time (TimedOut (..), timeout)
 -- >>> import Control.Exception (fromException, throwIO, toException)
 -- >>> import Control.Monad (unless)
@@ -85,7 +86,7 @@ retryingWith report delays act = go delays
 -- The period is at least a microsecond. A smaller number, or NaN, is refused with an
 -- 'Control.Exception.ErrorCall' (a fault), and nothing runs.
 --
--- >>> timeout 0.025 (every 0.01 (putStrLn "steer")) ? putStrLn "arrived"
+-- >>> _ <- simulate (timeout 0.25 (every 0.1 (putStrLn "steer")) ? putStrLn "arrived")
 -- steer
 -- steer
 -- steer

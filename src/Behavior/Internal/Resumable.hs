@@ -36,6 +36,11 @@ import Behavior.Internal.Runtime (atomically)
 -- [Cancellation] Passes through; the element stays in the list. The behaviour runs in the caller's
 --   thread and masking state.
 --
+-- An effect outside of variables (a report that is sent) which must not be repeated, is the last step,
+-- does not block after its effect, and is masked, so that nothing comes between it and the commit:
+--
+-- > mask $ \restore -> resumable left (\x -> restore (driveTo x) >> report x)
+--
 -- Other threads may add elements behind the first one. It runs in constant space.
 --
 -- >>> left <- newTVarIO ["north", "east", "south"]
