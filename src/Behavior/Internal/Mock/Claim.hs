@@ -22,6 +22,7 @@ module Behavior.Internal.Mock.Claim
 import Control.Applicative ((<|>))
 import Data.Char (toUpper)
 import Data.List (intercalate, isPrefixOf)
+import Data.Maybe (listToMaybe)
 
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
@@ -36,7 +37,8 @@ import Behavior.Internal.Runtime (Seconds)
 -- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
 -- >>> let check claim = either putStr pure (verdict claim record)
 
--- | A claim about a record. Two claims joined by '<>' hold when both hold.
+-- | A claim about a record. Two claims joined by '<>' hold when both hold; if not, the report has the
+-- one that does not.
 --
 -- The claims are the most common patterns of specifications (Dwyer, Avrunin and
 -- Corbett, /Patterns in property specifications for finite-state verification/):
@@ -47,9 +49,17 @@ import Behavior.Internal.Runtime (Seconds)
 data Claim = Claim
   { claimWords :: String
   , claimNames :: [String]
-  , violation :: Lines -> Origin -> Maybe (String, Lines)
-  -- ^ If it does not hold for the entries after the origin: why not, and the entries that
-  -- show it.
+  , violation :: Lines -> Origin -> Maybe Violation
+  -- ^ How it does not hold for the entries after the origin, if so.
+  }
+
+-- | How a claim does not hold.
+data Violation = Violation
+  { broken :: String
+  -- ^ The claim; of several that are joined, the one that does not hold.
+  , reason :: String
+  , shown :: Lines
+  -- ^ The entries that show it.
   }
 
 -- | The entry after which a claim is checked, and its time. (For the whole record the
@@ -121,7 +131,7 @@ exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords 
 --
 -- @since 0.1.0.0
 always :: Interval -> Claim
-always s = Claim ("always " ++ intervalWords s) (intervalNames s) $ \rows (Origin origin _) ->
+always s = simple ("always " ++ intervalWords s) (intervalNames s) $ \rows (Origin origin _) ->
   let isInside n = any (\(from, to) -> from <= n && n < to) (intervalRanges s rows)
    in case [row | row@(n, entry) <- rows, n > origin, not (isInitial entry || isInside n)] of
         [] -> Nothing
@@ -148,7 +158,7 @@ always s = Claim ("always " ++ intervalWords s) (intervalNames s) $ \rows (Origi
 -- @since 0.1.0.0
 comesBefore :: Moment -> Moment -> Claim
 comesBefore a b =
-  Claim (momentWords a ++ " before " ++ momentWords b) (momentNames a ++ momentNames b) $ \rows (Origin origin _) ->
+  simple (momentWords a ++ " before " ++ momentWords b) (momentNames a ++ momentNames b) $ \rows (Origin origin _) ->
     let after m = filter ((> origin) . fst) (occurrences m rows)
      in case (after a, after b) of
           (_, []) -> Nothing
@@ -166,19 +176,23 @@ infix 7 `comesBefore`
 -- @since 0.1.0.0
 whenever :: Moment -> Claim -> Claim
 whenever m claim =
-  Claim words' (momentNames m ++ claimNames claim) $ \rows (Origin origin _) ->
-    case [ ("from " ++ inSeconds (time row) ++ " on, " ++ why, row : seen)
-         | row@(n, _) <- occurrences m rows
-         , n > origin
-         , Just (why, seen) <- [violation claim rows (Origin n (time row))]
-         ] of
-      [] -> Nothing
-      first : _ -> Just first
+  Claim (words' (claimWords claim)) (momentNames m ++ claimNames claim) $ \rows (Origin origin _) ->
+    listToMaybe
+      [ Violation (words' (broken v)) ("from " ++ inSeconds (time row) ++ " on, " ++ reason v) (row : shown v)
+      | row@(n, _) <- occurrences m rows
+      , n > origin
+      , Just v <- [violation claim rows (Origin n (time row))]
+      ]
  where
-  words' = "whenever " ++ momentWords m ++ ", " ++ claimWords claim
+  words' then' = "whenever " ++ momentWords m ++ ", " ++ then'
+
+-- | A claim that is not made of others: its words, its names, and why it does not hold, with the
+-- entries that show it.
+simple :: String -> [String] -> (Lines -> Origin -> Maybe (String, Lines)) -> Claim
+simple words' names check = Claim words' names (\rows origin -> uncurry (Violation words') <$> check rows origin)
 
 claimOf :: String -> Moment -> (Origin -> Lines -> Maybe (String, Lines)) -> Claim
-claimOf words' m check = Claim words' (momentNames m) $ \rows origin@(Origin after _) ->
+claimOf words' m check = simple words' (momentNames m) $ \rows origin@(Origin after _) ->
   check origin (filter ((> after) . fst) (occurrences m rows))
 
 time :: (Int, RecordEntry) -> Seconds
@@ -203,14 +217,15 @@ holds claim = either (const False) (const True) . verdict claim
 verdict :: Claim -> Record -> Either String ()
 verdict claim record = case (unknown, violation claim (numbered record) (Origin (-1) 0)) of
   (name : _, _) ->
-    refuted ("Nothing in this world is called " ++ show name ++ ", only " ++ commas (map show (subjects record)) ++ ".") []
-  ([], Just (why, seen)) -> refuted (capital why ++ if null (entries record) then "." else ":") (excerpt (map fst seen) (entries record))
+    refuted (claimWords claim) ("Nothing in this world is called " ++ show name ++ ", only " ++ commas (map show (subjects record)) ++ ".") []
+  ([], Just v) ->
+    refuted (broken v) (capital (reason v) ++ if null (entries record) then "." else ":") (excerpt (map fst (shown v)) (entries record))
   ([], Nothing) -> Right ()
  where
   unknown = [name | name <- claimNames claim, not (any (`names` name) (subjects record))]
   names known name = known == name || (known ++ " ") `isPrefixOf` name
   commas = intercalate ", "
-  refuted why shown = Left (unlines (("This does not hold: " ++ claimWords claim ++ ".") : why : shown))
+  refuted which why rows = Left (unlines (("This does not hold: " ++ which ++ ".") : why : rows))
   capital why = map toUpper (take 1 why) ++ drop 1 why
 
 -- | The given lines, marked, each with the two before and after it; if none are given,
