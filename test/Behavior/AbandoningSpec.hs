@@ -3,6 +3,7 @@
 -- other operators, which hold while nothing is abandoned, are in the specs that go through "Places".
 module Behavior.AbandoningSpec (spec) where
 
+import Control.Concurrent (newEmptyMVar, takeMVar)
 import Control.Concurrent.Async (asyncThreadId)
 import Control.Concurrent.STM (newTVarIO, writeTVar)
 import Control.Exception
@@ -11,6 +12,7 @@ import Data.Foldable (for_)
 import Data.IORef
 import Data.List (isInfixOf)
 import GHC.Conc (getUncaughtExceptionHandler, setUncaughtExceptionHandler)
+import System.Mem (performMajorGC)
 import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 
@@ -66,21 +68,41 @@ spec = guarded . describe "abandoning" $ do
     reports <- newLog
     entered <- newGate
     mayEnd <- newGate
-    threads <- liveThreadCount
-    handler <- getUncaughtExceptionHandler
-    (`finally` setUncaughtExceptionHandler handler) $ do
-      setUncaughtExceptionHandler (note reports . show)
+    reporting (note reports . show) $ do
       let stuck = uninterruptibleMask_ (open entered >> pass mayEnd >> throwIO (Fault "camera"))
       cancelling (abandoning 0.001 stuck) (pass entered) `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
       abandonedCount `shouldReturn` 1
       eventually ((== 1) . length <$> notes reports)
       open mayEnd
       eventually ((== 0) <$> abandonedCount)
-      eventually ((== threads) <$> liveThreadCount)
+      eventually ((== 2) . length <$> notes reports)
     notes reports
       `shouldReturn` [ "abandoning: a behaviour that has not ended 0.001 s after its stop was requested is abandoned, and still runs"
                      , "abandoning: a behaviour that was abandoned has ended with " ++ show (Fault "camera")
                      ]
+
+  for_ [("throws an asynchronous exception", const (throwIO StackOverflow)), ("blocks", pass)] $ \(how, act) ->
+    it ("counts right, and reports the end, although the handler " ++ how) $ do
+      calls <- newLog
+      release <- newGate
+      entered <- newGate
+      mayEnd <- newGate
+      reporting (\_ -> note calls () >> act release) $ do
+        _ <- cancelling (abandoning 0.001 (uninterruptibleMask_ (open entered >> pass mayEnd))) (pass entered)
+        eventually ((== 1) . length <$> notes calls)
+        abandonedCount `shouldReturn` 1
+        open mayEnd
+        eventually ((== 0) <$> abandonedCount)
+        open release
+        eventually ((== 2) . length <$> notes calls)
+
+  it "reports the end of a behaviour that is deadlocked" $ do
+    calls <- newLog
+    entered <- newGate
+    reporting (note calls . show) $ do
+      _ <- cancelling (abandoning 0.001 (uninterruptibleMask_ (open entered >> (newEmptyMVar >>= takeMVar :: IO ())))) (pass entered)
+      eventually (performMajorGC >> (== 2) . length <$> notes calls)
+    last <$> notes calls `shouldReturn` "abandoning: a behaviour that was abandoned has ended with " ++ show BlockedIndefinitelyOnMVar
 
   it "is not interrupted while it waits: a second cancellation stays pending" $ do
     entered <- newGate
@@ -126,3 +148,11 @@ landedAt filming = do
   _ <- simulateWith defaults {endAt = 100} $
     Signal.insteadWhen (watchedVar windy) land (filming film `both` hang) `both` wind
   readIORef landed
+
+-- | Runs the action with this handler for uncaught exceptions, and waits for the watchers.
+reporting :: (SomeException -> IO ()) -> IO () -> IO ()
+reporting handler act = do
+  threads <- liveThreadCount
+  usual <- getUncaughtExceptionHandler
+  setUncaughtExceptionHandler handler
+  (act >> eventually ((== threads) <$> liveThreadCount)) `finally` setUncaughtExceptionHandler usual

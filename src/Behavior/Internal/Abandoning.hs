@@ -11,12 +11,12 @@ module Behavior.Internal.Abandoning
   , Abandoned (..)
   ) where
 
-import Control.Exception (Exception (..), SomeException, mask, onException)
-import Control.Monad (unless, void)
-import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
+import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar, readTVarIO, writeTVar)
+import Control.Exception (Exception (..), SomeException, mask, onException, try)
+import Control.Monad (join, void, when)
 import System.IO.Unsafe (unsafePerformIO)
 
-import Behavior.Internal.Failure (Behavior, trySynchronous)
+import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
 import Behavior.Internal.Seconds (duration)
@@ -40,7 +40,8 @@ import Behavior.Internal.Seconds (duration)
 -- > insteadWhen wind land (both fly (abandoning 2 film))
 --
 -- [Result] The behaviour's.
--- [Failure, fault] Of the behaviour: thrown, also while it is being stopped.
+-- [Failure] Of the behaviour: thrown. While the behaviour is being stopped: the cancellation goes on.
+-- [Fault] Of the behaviour, also while it is being stopped: thrown.
 -- [Cancellation] Requests the behaviour's stop. If the behaviour ends in time, all is as in any
 --   operator. Otherwise the cancellation goes on, and what the behaviour returns or throws later is
 --   reported, but has no effect. While it is awaited nothing interrupts the caller.
@@ -59,35 +60,39 @@ import Behavior.Internal.Seconds (duration)
 abandoning :: Seconds -> Behavior a -> Behavior a
 abandoning seconds act = do
   limit <- duration "abandoning" seconds
+  isAbandoned <- newTVarIO False
+  -- It is counted off by the transaction in which it ends.
+  let countOff _ = readTVar isAbandoned >>= \is -> when is (modifyTVar' abandonedNow (subtract 1))
   -- Masked, so that no exception comes before the handler is in place: without it 'structured' would
   -- wait for the branch.
   structured $ \scope -> mask $ \restore -> do
-    acting <- branch scope (Label "abandoning" "branch") act
-    restore (outcomeToIO <$> awaitOutcome acting) `onException` stopWithin limit scope acting
+    acting <- branchWithHook countOff scope (Label "abandoning" "branch") act
+    restore (outcomeToIO <$> awaitOutcome acting) `onException` stopWithin limit isAbandoned scope acting
 
 -- | Requests the stop of the branch, and waits for it; when the time is up, takes it out of the scope.
-stopWithin :: Seconds -> Scope -> Branch a -> IO ()
-stopWithin limit scope acting = do
+stopWithin :: Seconds -> TVar Bool -> Scope -> Branch a -> IO ()
+stopWithin limit isAbandoned scope acting = do
   requestStopAsync [SomeBranch acting]
   clock <- branch scope (Label "abandoning" "clock") (sleep limit)
   -- The branch is read first: one that has ended is not abandoned.
-  ended <- awaitUninterruptibly . atomically $
-    tryReadOutcomeSTM acting >>= maybe (False <$ outcome clock) (const (pure True))
-  unless ended $ do
-    forget scope acting
-    count 1
-    -- (It is counted off even if the end of a simulation comes before the watcher's first step.)
-    void (startWith Inherited (const (count (-1))) pure (Label "abandoning" "watcher") watch)
+  join . awaitUninterruptibly . atomically $
+    tryReadOutcomeSTM acting >>= \case
+      Just _ -> pure (pure ())
+      Nothing -> do
+        _ <- outcome clock
+        writeTVar isAbandoned True
+        modifyTVar' abandonedNow (+ 1)
+        pure (forget scope acting >> void (start (Label "abandoning" "watcher") watch))
  where
   watch = do
     report (StillRuns limit)
-    awaitOutcome acting >>= report . HasEnded . \case
+    awaitUninterruptibly (awaitOutcome acting) >>= report . HasEnded . \case
       Completed _ -> Nothing
       Stopped _ -> Nothing
       Failing e -> Just e
       Faulted e -> Just e
-  -- (What the users' handler throws must not end the watcher.)
-  report = void . trySynchronous . reportUncaught
+  -- What the users' handler throws, of whatever type, must not end the watcher.
+  report what = void (try (reportUncaught what) :: IO (Either SomeException ()))
 
 -- | What is reported of a behaviour that was abandoned. It is never thrown.
 --
@@ -113,11 +118,8 @@ instance Exception Abandoned
 --
 -- @since 0.1.0.0
 abandonedCount :: IO Int
-abandonedCount = readIORef abandonedNow
+abandonedCount = readTVarIO abandonedNow
 
-count :: Int -> IO ()
-count n = atomicModifyIORef' abandonedNow (\before -> (before + n, ()))
-
-abandonedNow :: IORef Int
-abandonedNow = unsafePerformIO (newIORef 0)
+abandonedNow :: TVar Int
+abandonedNow = unsafePerformIO (newTVarIO 0)
 {-# NOINLINE abandonedNow #-}

@@ -7,7 +7,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Resumable (resumable) where
 
-import Control.Concurrent.STM (TVar, modifyTVar', readTVar)
+import Control.Concurrent.STM (TVar, modifyTVar, readTVar)
 import Control.Exception (mask)
 
 import Behavior.Internal.Failure (Behavior)
@@ -62,6 +62,6 @@ resumable left act =
   atomically (readTVar left) >>= \case
     [] -> pure ()
     next : _ -> do
-      -- Masked, so that nothing comes between its return and the commit.
-      mask $ \restore -> restore (act next) >> atomically (modifyTVar' left (drop 1))
+      -- Masked, so that nothing comes between its return and the commit, which forces nothing.
+      mask $ \restore -> restore (act next) >> atomically (modifyTVar left (drop 1))
       resumable left act

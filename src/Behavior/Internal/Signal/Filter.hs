@@ -72,9 +72,9 @@ debounce seconds signal = Signal $ \demand -> do
 -- one before it was less than the given number of seconds ago (zero or more). Then the signal keeps
 -- its value until that time has passed, and takes the one that is then the latest.
 --
--- So no change comes to the operator too soon after another, and the last one always comes. Like that of
--- 'debounce', its memory begins afresh after a time when it was not watched. In an operator that
--- restarts its branch at each change, it bounds how often:
+-- So two changes of the signal are at least that far apart, and the last one always comes. Like that of
+-- 'debounce', its memory begins afresh after a time when it was not watched. It bounds how often an
+-- operator restarts its branch:
 --
 -- > planner ||| Signal.switch (Signal.throttle 5 path) fly
 --
@@ -108,7 +108,8 @@ throttle seconds signal = Signal $ \demand -> do
 -- > Signal.whileHolding (not \<$\> Signal.olderThan 0.5 (stamp \<$\> scan)) drive
 --
 -- The driver stores a reading together with its time; a polled sensor does with
--- @polling 0.1 ((,) \<$\> now \<*\> readScan)@. A time that is NaN is a fault. Unlike 'staleAfter' this
+-- @polling 0.1 ((,) \<$\> now \<*\> readScan)@. The times should not decrease: after one that is earlier
+-- than the one before, the signal is late, by up to their difference. A time that is NaN is a fault. Unlike 'staleAfter' this
 -- gives a condition, works with every signal, and goes by the time of the last reading that there is.
 --
 -- >>> stamp <- now

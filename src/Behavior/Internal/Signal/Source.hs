@@ -56,7 +56,8 @@ import Behavior.Internal.Scope
 -- signal with several sources consists of the latest value of each, which may be from
 -- different moments. The signal has a value when each source has one.
 --
--- A change that is undone before the next reading has no effect.
+-- A change that is undone before the next reading has no effect. A value must be equal to itself: with
+-- NaN, which is not, a signal changes all the time, and what watches it never rests.
 --
 -- @since 0.1.0.0
 newtype Signal a = Signal {open :: Demand a -> IO (Source a)}
