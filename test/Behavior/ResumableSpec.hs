@@ -46,11 +46,8 @@ spec = guarded $ do
   it "does not run the behaviour twice for an element whose successor is undefined" $ do
     entries <- newLog
     left <- newTVarIO ('a' : errorWithoutStackTrace "no such place")
-    ending (resumable left (note entries)) `shouldReturn` FaultedWith "no such place"
+    for_ [1, 2 :: Int] $ \_ -> ending (resumable left (note entries)) `shouldReturn` FaultedWith "no such place"
     notes entries `shouldReturn` "a"
-    atomically (writeTVar left "b")
-    resumable left (note entries)
-    notes entries `shouldReturn` "ab"
 
   it "goes on to what was added meanwhile" $ do
     entries <- newLog
