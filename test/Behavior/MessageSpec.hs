@@ -257,10 +257,12 @@ mockDriver = do
     for_ "abc" $ \m -> world `shouldRecord` eventually (noted ("orders: " ++ show m))
 
   it "throws what the callback threw when the subscription ends" $ do
-    (_, orders) <- world'
-    ended <- newIORef Nothing
-    _ <- simulate $ ending (orders (\_ -> throwIO (Fault "callback")) >>= (sleep 2 >>)) >>= writeIORef ended . Just
-    readIORef ended `shouldReturn` Just (FaultedWith (show (Fault "callback")))
+    for_ [(throwIO (Fault "callback"), FaultedWith (show (Fault "callback"))), (throwIO ThreadKilled, CancelledBy "thread killed")] $
+      \(callback, expected) -> do
+        (_, orders) <- world'
+        ended <- newIORef Nothing
+        _ <- simulate $ ending (orders (const callback) >>= (sleep 2 >>)) >>= writeIORef ended . Just
+        readIORef ended `shouldReturn` Just expected
 
   it "refuses times that decrease or are negative, and names that are used" $ do
     world <- newMock

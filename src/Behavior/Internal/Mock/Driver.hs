@@ -6,8 +6,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Driver (driver) where
 
-import Control.Exception (AsyncException (..), fromException, mask_, throwIO, uninterruptibleMask_)
-import Control.Monad (unless)
+import Control.Exception (Exception (..), mask_, throwIO, uninterruptibleMask_)
 import Data.Foldable (for_)
 
 import Behavior.Internal.Mock.World
@@ -50,9 +49,15 @@ driver mock name messages = do
     thread <- mask_ . start (Label "driver" name) . for_ due $ \(at, e) ->
       sleepUntil (zero + at) >> saying (show e) >> deliver e
     pure . uninterruptibleMask_ $ do
-      interrupt (threadId thread) ThreadKilled
+      interrupt (threadId thread) Unsubscribed
       end <- atomically (threadEnd thread)
       saying "unsubscribed"
-      either (\e -> unless (fromException e == Just ThreadKilled) (throwIO e)) pure end
+      either (\e -> maybe (throwIO e) (\Unsubscribed -> pure ()) (fromException e)) pure end
  where
   saying what = note mock (name ++ ": " ++ what)
+
+-- | Ends the thread of a subscription.
+data Unsubscribed = Unsubscribed
+  deriving (Show)
+
+instance Exception Unsubscribed
