@@ -95,6 +95,20 @@ olderThan = do
           stamps = scanl1 (\(_, before) (t, stamp) -> (t, max before stamp)) [(t, t - fromIntegral (2 * back)) | (t, back) <- steps]
       (=== ages limit stamps) <$> observed (\stamp -> (,) <$> stamp <*> Signal.olderThan limit stamp) stamps
 
+  it "judges a time that is earlier than the one before at once" $ do
+    stamp <- newTVarIO 0
+    let script' = sleep 1 >> atomically (writeTVar stamp (-9))
+    run <- simulate (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (script' >> hang))
+    finished run `shouldBe` 1
+
+  it "faults as soon as the time is NaN" $ do
+    stamp <- newTVarIO 0
+    end <- newIORef Nothing
+    let script' = sleep 1 >> atomically (writeTVar stamp (0 / 0))
+    run <- simulate $ ending (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (script' >> hang)) >>= writeIORef end . Just
+    finished run `shouldBe` 1
+    readIORef end `shouldReturn` Just (FaultedWith "olderThan: a point in time is a number, not NaN")
+
   it "is never true with an infinite limit, or for a time in the future" $
     for_ [(1 / 0, 0), (1, 1 / 0)] $ \(limit, ahead) -> do
       t <- now
@@ -102,7 +116,7 @@ olderThan = do
 
   it "faults with a time that is NaN" $
     ending (Signal.waitUntil (Signal.olderThan 1 (pure (0 / 0))))
-      `shouldReturn` FaultedWith "sleepUntil: a point in time is a number, not NaN"
+      `shouldReturn` FaultedWith "olderThan: a point in time is a number, not NaN"
 
   for_ [SensorFailure, SensorFault, NoValue] $ \newState ->
     it ("does not wait when the new state of its signal is " ++ show newState) $ do

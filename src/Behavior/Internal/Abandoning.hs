@@ -50,6 +50,8 @@ import Behavior.Internal.Seconds (duration)
 -- passed to GHC's handler for uncaught exceptions, which prints it to @stderr@ unless
 -- 'GHC.Conc.setUncaughtExceptionHandler' has set another. (In a simulation it is in the record of the run.)
 -- Until then the behaviour is counted ('abandonedCount'), and its thread remains, with two that wait for it.
+-- The end of the program ends it, without a report. With zero seconds also a behaviour is abandoned
+-- that would have stopped at once.
 --
 -- A negative number or NaN is refused with an 'Control.Exception.ErrorCall' (a fault).
 --

@@ -88,8 +88,9 @@ withInbox size subscribe behavior = do
 -- The handler does what takes time, and returns a transaction. That transaction and the removal of
 -- the message are one step: whatever interrupts the handler, each message's transaction is committed
 -- /exactly once/ (unless the message is dropped), and the handler's 'IO' before it runs /at least
--- once/: a message whose handler was interrupted, failed or faulted waits again, in its old place.
--- While it is handled it does not count towards the inbox's capacity.
+-- once/: a message whose handler was interrupted, failed or faulted waits again, in its old place (in
+-- an inbox that has become full it is the oldest, and is dropped). While it is handled it does not
+-- count towards the inbox's capacity.
 --
 -- As with 'Behavior.Signal.monitor' the task is stopped first, and restarts from its beginning
 -- (what must go on where it was, uses 'Behavior.STM.resumable'). Only the caller can interrupt the

@@ -19,7 +19,7 @@ import Control.Exception (ErrorCall (..), SomeException, throwIO)
 import Control.Monad (forever, unless, when)
 
 import Behavior.Internal.Runtime
-import Behavior.Internal.Seconds (duration)
+import Behavior.Internal.Seconds (duration, moment)
 import Behavior.Internal.Signal.Source
 
 -- $setup
@@ -69,7 +69,7 @@ debounce seconds signal = Signal $ \demand -> do
       }
 
 -- | Limits the rate of changes: the first value counts at once, and so does each change, unless the
--- one before it was less than the given number of seconds ago (zero or more). Then the signal keeps
+-- last one that counted was less than the given number of seconds ago (zero or more). Then the signal keeps
 -- its value until that time has passed, and takes the one that is then the latest.
 --
 -- So two changes of the signal are at least that far apart, and the last one always comes. Like that of
@@ -108,8 +108,8 @@ throttle seconds signal = Signal $ \demand -> do
 -- > Signal.whileHolding (not \<$\> Signal.olderThan 0.5 (stamp \<$\> scan)) drive
 --
 -- The driver stores a reading together with its time; a polled sensor does with
--- @polling 0.1 ((,) \<$\> now \<*\> readScan)@. The times should not decrease: after one that is earlier
--- than the one before, the signal is late, by up to their difference. A time that is NaN is a fault. Unlike 'staleAfter' this
+-- @polling 0.1 ((,) \<$\> now \<*\> readScan)@. After a time that is earlier than the one before, it can be
+-- late to become true, by up to their difference. A time that is NaN is a fault. Unlike 'staleAfter' this
 -- gives a condition, works with every signal, and goes by the time of the last reading that there is.
 --
 -- >>> stamp <- now
@@ -120,27 +120,35 @@ olderThan :: Seconds -> Signal Seconds -> Signal Bool
 olderThan seconds signal = Signal $ \demand -> do
   _ <- duration "olderThan" seconds
   source <- open (suppressEqual signal) everyValue {readingTimes = readingTimes demand}
-  -- A time, and whether it is too old.
-  judged <- newTVarIO Nothing
+  judged <- newTVarIO Nothing -- a time, and whether it is too old
   let judge value = forever $ do
         time <- atomically $ do
           v <- value
           known <- readTVar judged
-          v <$ check (known /= Just (v, True))
+          v <$ check (fmap fst known /= Just v)
+        end <- moment "olderThan" (time + seconds)
         t <- now
-        let tooOld = time + seconds <= t
-        atomically (writeTVar judged (Just (time, tooOld)))
-        unless tooOld (sleepUntil (time + seconds))
+        atomically (writeTVar judged (Just (time, end <= t)))
+      expire = forever $ do
+        time <- atomically $
+          readTVar judged >>= \case
+            Just (time, False) -> pure time
+            _ -> retry
+        sleepUntil (time + seconds)
+        -- (A newer time, if there is one, is then judged again.)
+        atomically (writeTVar judged (Just (time, True)))
       judgement value = do
         v <- value
         readTVar judged >>= \case
-          Just (time, tooOld)
-            | v == time -> pure tooOld
-            | v > time && not tooOld -> pure False
+          Just (time, tooOld) | v == time -> pure tooOld
           _ -> retry
   pure
     source
-      { workers = workers source ++ [Worker "olderThan" (writeTVar judged Nothing >> const . judge . ignoreErrors <$> view source)]
+      { workers =
+          workers source
+            ++ [ Worker "olderThan" (writeTVar judged Nothing >> const . judge . ignoreErrors <$> view source)
+               , Worker "olderThan clock" (pure (const expire))
+               ]
       , view = mapView judgement <$> view source
       }
 
