@@ -141,6 +141,7 @@ module Behavior
   , failingOn
   , Failed (..)
   , BehaviorFailed (..)
+  , failurePath
   , behaviorFailedToException
   , behaviorFailedFromException
 

@@ -29,6 +29,7 @@ module Behavior.Signal
 
     -- ** Naming
   , named
+  , namedWith
 
     -- ** Sharing between operators
   , withShared

@@ -5,7 +5,7 @@
 
 HsInt behavior_lang_threads = 0;
 HsInt behavior_lang_simulations = 0;
-HsInt behavior_lang_sinks = 0;
+HsInt behavior_lang_traces = 0;
 
 void behavior_lang_add(HsInt *counter, HsInt n)
 {

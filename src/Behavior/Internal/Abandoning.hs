@@ -12,7 +12,7 @@ module Behavior.Internal.Abandoning
   ) where
 
 import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar, readTVarIO, writeTVar)
-import Control.Exception (Exception (..), SomeException, mask, onException, try)
+import Control.Exception (Exception (..), SomeException, catch, mask, throwIO, try)
 import Control.Monad (join, void, when)
 import System.IO.Unsafe (unsafePerformIO)
 
@@ -20,6 +20,10 @@ import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
 import Behavior.Internal.Seconds (duration)
+import Behavior.Internal.Stop (causeOf)
+import Behavior.Internal.Trace.Event (Cause)
+import Behavior.Internal.Trace.Place (inPlace)
+import Behavior.Internal.Trace.Span (abandonableIn)
 
 -- $setup
 -- >>> import Behavior
@@ -67,14 +71,16 @@ abandoning seconds act = do
   let countOff _ = readTVar isAbandoned >>= \is -> when is (modifyTVar' abandonedNow (subtract 1))
   -- Masked, so that no exception comes before the handler is in place: without it 'structured' would
   -- wait for the branch.
-  structured $ \scope -> mask $ \restore -> do
-    acting <- branchWithHook countOff scope (Label "abandoning" "branch") act
-    restore (outcomeToIO <$> awaitOutcome acting) `onException` stopWithin limit isAbandoned scope acting
+  structured "abandoning" $ \scope -> mask $ \restore -> do
+    (acting, endSpans) <- abandonableIn (branchWithHook countOff scope (Label "abandoning" "branch") act)
+    restore (endedBy "branch" <$> awaitOutcome acting)
+      `catch` \e -> stopWithin limit isAbandoned endSpans scope (causeOf e) acting >> throwIO (e :: SomeException)
 
--- | Requests the stop of the branch, and waits for it; when the time is up, takes it out of the scope.
-stopWithin :: Seconds -> TVar Bool -> Scope -> Branch a -> IO ()
-stopWithin limit isAbandoned scope acting = do
-  requestStopAsync [SomeBranch acting]
+-- | Requests the stop of the branch, and waits for it; when the time is up, takes it out of the scope,
+-- and ends its spans.
+stopWithin :: Seconds -> TVar Bool -> IO () -> Scope -> Cause -> Branch a -> IO ()
+stopWithin limit isAbandoned endSpans scope cause acting = do
+  requestStopAsync cause [SomeBranch acting]
   clock <- branch scope (Label "abandoning" "clock") (sleep limit)
   -- The branch is read first: one that has ended is not abandoned.
   join . awaitUninterruptibly . atomically $
@@ -84,7 +90,7 @@ stopWithin limit isAbandoned scope acting = do
         _ <- outcome clock
         writeTVar isAbandoned True
         modifyTVar' abandonedNow (+ 1)
-        pure (forget scope acting >> void (start (Label "abandoning" "watcher") watch))
+        pure (forget scope acting >> endSpans >> void (inPlace Nothing (start (Label "abandoning" "watcher") watch)))
  where
   watch = do
     report (StillRuns limit)

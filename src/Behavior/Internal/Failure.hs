@@ -25,6 +25,7 @@ module Behavior.Internal.Failure
 
     -- * The hierarchy
   , BehaviorFailed (..)
+  , failurePath
   , behaviorFailedToException
   , behaviorFailedFromException
   , Failed (..)
@@ -65,6 +66,7 @@ import Control.Exception
   )
 import Control.Monad.Catch (MonadThrow (throwM))
 import Data.Foldable (toList)
+import Data.List (intercalate)
 import Data.Maybe (isJust)
 import Data.Typeable (cast)
 
@@ -97,29 +99,43 @@ type Behavior = IO
 -- >>> try (throwIO DoorLocked) >>= either (\DoorLocked -> putStrLn "fetch the key") pure
 -- fetch the key
 --
+-- In a trace it contains the path of the names around the place where it was thrown
+-- ("Behavior.Trace"), from the outside in, and is shown with it; otherwise the path is empty.
+--
 -- /Section 5 of the paper./
 --
 -- @since 0.1.0.0
-data BehaviorFailed = forall e. Exception e => BehaviorFailed e
+data BehaviorFailed = forall e. Exception e => BehaviorFailed [String] e
 
 instance Show BehaviorFailed where
-  showsPrec precedence (BehaviorFailed e) = showsPrec precedence e
+  showsPrec precedence (BehaviorFailed path e)
+    | null path = showsPrec precedence e
+    | otherwise = showParen (precedence > 10) (showString (renderPath path) . shows e)
 
 instance Exception BehaviorFailed where
-  displayException (BehaviorFailed e) = displayException e
+  displayException (BehaviorFailed path e) = renderPath path ++ displayException e
+
+renderPath :: [String] -> String
+renderPath path = if null path then "" else intercalate " > " path ++ ": "
+
+-- | The names of the spans in which it was thrown, from the outside in; empty without a trace.
+--
+-- @since 0.1.0.0
+failurePath :: BehaviorFailed -> [String]
+failurePath (BehaviorFailed path _) = path
 
 -- | The 'toException' of a type that is to be a failure.
 --
 -- @since 0.1.0.0
 behaviorFailedToException :: Exception e => e -> SomeException
-behaviorFailedToException = toException . BehaviorFailed
+behaviorFailedToException = toException . BehaviorFailed []
 
 -- | The 'fromException' of a type that is to be a failure.
 --
 -- @since 0.1.0.0
 behaviorFailedFromException :: Exception e => SomeException -> Maybe e
 behaviorFailedFromException e = do
-  BehaviorFailed inner <- fromException e
+  BehaviorFailed _ inner <- fromException e
   cast inner
 
 -- | The failure to throw when no better one is at hand.
@@ -183,7 +199,7 @@ failingOn chosen act =
     Just fault | not (isFailure e || isCancellation e), chosen fault -> throwIO (asFailure e)
     _ -> throwIO e
  where
-  asFailure (SomeException e) = BehaviorFailed e
+  asFailure (SomeException e) = BehaviorFailed [] e
 
 -- | Whether an exception is a failure.
 isFailure :: SomeException -> Bool
@@ -235,7 +251,7 @@ fallback first second =
 -- | 'fallback' where the second behaviour is given the failure.
 --
 -- > fallbackWith (pure a) b    =  pure a
--- > fallbackWith failed b      =  b (BehaviorFailed Failed)
+-- > fallbackWith failed b      =  b (BehaviorFailed [] Failed)
 -- > fallbackWith a (const b)   =  fallback a b
 --
 -- Faults and cancellations of the first pass through. The second runs as it does in

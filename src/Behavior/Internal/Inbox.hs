@@ -25,7 +25,7 @@ import qualified Data.Sequence as Seq
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine (Next (..), Reaction (..), react)
 import Behavior.Internal.Runtime (atomically)
-import Behavior.Internal.Signal.Source (watching)
+import Behavior.Internal.Signal.Source (named, watching)
 
 -- $setup
 -- >>> import Behavior
@@ -110,7 +110,7 @@ withInbox size subscribe behavior = do
 --
 -- @since 0.1.0.0
 onMessage :: Inbox e -> (e -> Behavior (STM ())) -> Behavior a -> Behavior a
-onMessage inbox handle task = react "onMessage" (watching ((> 0) <$> waiting inbox)) $ \case
+onMessage inbox handle task = react "onMessage" ((> 0) <$> named "messages waiting" (watching (waiting inbox))) $ \case
   True -> RunToEnd "handler" (BeginAgain <$ handleIfAny)
   False -> Run "task" task
  where

@@ -38,10 +38,10 @@ publish (Leftmost variable) n x =
 publishFailure :: Leftmost SomeException -> Int -> Outcome a -> STM ()
 publishFailure leftmost n = either (publish leftmost n) (\_ -> pure ()) . result
 
--- | What was published; retries until something was.
-readLeftmost :: Leftmost x -> STM x
-readLeftmost (Leftmost variable) = readTVar variable >>= maybe retry (pure . snd)
+-- | What was published, and the number of its branch; retries until something was.
+readLeftmost :: Leftmost x -> STM (Int, x)
+readLeftmost (Leftmost variable) = readTVar variable >>= maybe retry pure
 
 -- | What was published, if anything was. Does not block.
-tryReadLeftmost :: Leftmost x -> IO (Maybe x)
-tryReadLeftmost (Leftmost variable) = fmap snd <$> readTVarIO variable
+tryReadLeftmost :: Leftmost x -> IO (Maybe (Int, x))
+tryReadLeftmost (Leftmost variable) = readTVarIO variable

@@ -29,6 +29,7 @@ import Behavior.Internal.Failure
 import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (Label (..), atomically)
 import Behavior.Internal.Scope hiding (requestStop)
+import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior
@@ -94,18 +95,18 @@ instance Exception ChildStopped where
 scoped :: (Nursery -> Behavior a) -> Behavior a
 scoped body = do
   stage <- newTVarIO (Open [])
-  structured (\scope -> serveRequests stage scope (body (Nursery stage)) `finally` atomically (writeTVar stage Ending))
+  structured "scoped" (\scope -> serveRequests stage scope (body (Nursery stage)) `finally` atomically (writeTVar stage Ending))
     `finally` atomically (writeTVar stage Closed)
 
 -- | Serves the requests to start and stop children, until there is a verdict.
-serveRequests :: TVar Stage -> Scope -> Behavior a -> IO (IO a)
+serveRequests :: TVar Stage -> Scope -> Behavior a -> IO (Verdict a)
 serveRequests stage scope body = do
   failure <- newLeftmost
   main <- branch scope (Label "scoped" "body") body
   let -- How many were forked; the children that may still run; and the number of forks at which
       -- to remove those that have ended.
       serve count children sweepAt = do
-        next <- atomically (asum [Left . outcomeToIO <$> outcome main, Left . throwIO <$> readLeftmost failure, Right <$> requested])
+        next <- atomically (asum [Left . endedBy "body" <$> outcome main, Left . thrown <$> readLeftmost failure, Right <$> requested])
         case next of
           Left verdict -> pure verdict
           Right new -> do
@@ -116,7 +117,7 @@ serveRequests stage scope body = do
                 running <- filterM mayRun children'
                 serve count' running (count' + max 16 (length running))
       handleRequest (count, children) = \case
-        Stop child -> (count, children) <$ requestStopAsync [child]
+        Stop child -> (count, children) <$ requestStopAsync (FromOutside "requestStop") [child]
         Fork act accepted -> do
           let n = count + 1 :: Int
           -- Masked: a branch that was started is also handed over.
@@ -124,6 +125,7 @@ serveRequests stage scope body = do
             new <- branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act
             new <$ atomically (putTMVar accepted new)
           pure (n, SomeBranch child : children)
+      thrown (n, e) = Verdict (SiblingFailed ("fork " ++ show n)) (throwIO e)
       requested =
         readTVar stage >>= \case
           Open new@(_ : _) -> reverse new <$ writeTVar stage (Open [])

@@ -29,6 +29,7 @@ import Behavior.Internal.Failure (Behavior, BehaviorFailed, failed)
 import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
+import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior
@@ -54,12 +55,14 @@ import Behavior.Internal.Scope
 --
 -- @since 0.1.0.0
 parallel :: Behavior a -> Behavior b -> Behavior ()
-parallel left right = structured $ \scope -> do
+parallel left right = structured "parallel" $ \scope -> do
   l <- branch scope (Label "parallel" "left") (void left)
   r <- branch scope (Label "parallel" "right") (void right)
   -- Outside a transaction only the left one is read: if the right one were read so, the left
   -- one might have ended before it.
-  outcomeToIO <$> tryReadThenBlock (tryReadOutcome l) (atomically (tryReadOutcomeSTM l >>= maybe (outcome r) pure))
+  tryReadThenBlock
+    (fmap (endedBy "left") <$> tryReadOutcome l)
+    (atomically (tryReadOutcomeSTM l >>= maybe (endedBy "right" <$> outcome r) (pure . endedBy "left")))
 
 -- | 'parallel' as an operator. It binds looser than @?@ and tighter than
 -- 'Prelude.>>'. (@Control.Arrow@ has another function of this name.)
@@ -91,7 +94,7 @@ infixr 2 |||
 --
 -- @since 0.1.0.0
 both :: Behavior a -> Behavior b -> Behavior ()
-both left right = structured $ \scope -> do
+both left right = structured "both" $ \scope -> do
   l <- branch scope (Label "both" "left") (void left)
   r <- branch scope (Label "both" "right") (void right)
   let -- The left one is read first: what has ended then has also ended when the right one is read.
@@ -100,9 +103,9 @@ both left right = structured $ \scope -> do
   tryReadThenBlock tryReadBoth (atomically (readBoth >>= maybe retry pure))
  where
   verdict l r = case (result <$> l, result <$> r) of
-    (Just (Left e), _) -> Just (throwIO e)
-    (_, Just (Left e)) -> Just (throwIO e)
-    (Just (Right ()), Just (Right ())) -> Just (pure ())
+    (Just (Left e), _) -> Just (Verdict (SiblingFailed "left") (throwIO e))
+    (_, Just (Left e)) -> Just (Verdict (SiblingFailed "right") (throwIO e))
+    (Just (Right ()), Just (Right ())) -> Just (Verdict (SiblingFinished "right") (pure ()))
     _ -> Nothing
 
 -- | Starts all behaviours at once, and gives the result of the first to finish.
@@ -122,10 +125,11 @@ both left right = structured $ \scope -> do
 -- @since 0.1.0.0
 firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
-firstOf behaviors = structured $ \scope -> do
+firstOf behaviors = structured "firstOf" $ \scope -> do
   first <- newLeftmost
   void $ startAll (\n -> branchWithHook (publish first n) scope (Label "firstOf" (show n))) behaviors
-  outcomeToIO <$> tryReadThenBlock (tryReadLeftmost first) (atomically (readLeftmost first))
+  (n, end) <- tryReadThenBlock (tryReadLeftmost first) (atomically (readLeftmost first))
+  pure (endedBy (show n) end)
 
 -- | Starts all behaviours at once, waits for all, and gives their results, each in the place
 -- of its behaviour.
@@ -140,17 +144,17 @@ firstOf behaviors = structured $ \scope -> do
 --
 -- @since 0.1.0.0
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
-allOf behaviors = structured $ \scope -> do
+allOf behaviors = structured "allOf" $ \scope -> do
   failure <- newLeftmost
   branches <- startAll (\n -> branchWithHook (publishFailure failure n) scope (Label "allOf" (show n))) (toList behaviors)
-  let awaitAll [] = pure (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches)
+  let awaitAll [] = pure (Verdict (SiblingFinished "all") (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches))
       awaitAll (b : bs) = do
         failing <-
           tryReadThenBlock ((Nothing <$) <$> completedNow b) . atomically $
             tryReadOutcomeSTM b >>= \case
               Just (Completed _) -> pure Nothing
               _ -> Just <$> readLeftmost failure
-        maybe (awaitAll bs) (pure . throwIO) failing
+        maybe (awaitAll bs) (\(n, e) -> pure (Verdict (SiblingFailed (show n)) (throwIO e))) failing
   awaitAll branches
 
 -- | Starts all behaviours at once, and runs the behaviour that a function of their ends chooses.
@@ -210,10 +214,10 @@ decide :: ([Maybe (Either BehaviorFailed a)] -> Maybe (Behavior b)) -> [Behavior
 decide choose behaviors =
   evaluate (choose (Nothing <$ behaviors)) >>= \case
     Just chosen -> chosen
-    Nothing -> join . structured $ \scope -> do
+    Nothing -> join . structured "decide" $ \scope -> do
       ends <- newTVarIO (Right IntMap.empty)
       void $ startAll (\n -> branchWithHook (addEnd ends n) scope (Label "decide" (show n))) behaviors
-      chooseAfter ends 0
+      Verdict (SiblingFinished "enough") <$> chooseAfter ends 0
  where
   -- What the function throws is caught where it runs: what is thrown in the operator's thread
   -- would be taken for an exception from outside.

@@ -64,6 +64,6 @@ unpinned :: Behavior a -> Behavior a
 unpinned = inBranch Unpinned "unpinned"
 
 inBranch :: Placement -> String -> Behavior a -> Behavior a
-inBranch placement operator act = structured $ \scope -> do
+inBranch placement operator act = structured operator $ \scope -> do
   body <- branchPlaced placement scope (Label operator "body") act
-  outcomeToIO <$> awaitOutcome body
+  endedBy "body" <$> awaitOutcome body

@@ -16,6 +16,7 @@ import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.ProcessSignals (withSignals)
 import Behavior.Internal.Runtime (Label (..), atomically)
 import Behavior.Internal.Scope
+import Behavior.Internal.Trace.Event (Cause (..))
 
 -- | Runs a behaviour as a whole program; to be called by @main@.
 --
@@ -49,6 +50,8 @@ import Behavior.Internal.Scope
 -- @since 0.1.0.0
 runBehavior :: Behavior a -> IO a
 runBehavior behavior = withSignals $ \exitCode ->
-  structured $ \scope -> do
+  structured "runBehavior" $ \scope -> do
     program <- branch scope (Label "runBehavior" "program") behavior
-    atomically $ (outcomeToIO <$> outcome program) `orElse` (throwIO . ExitFailure <$> exitCode)
+    atomically $ (endedBy "program" <$> outcome program) `orElse` (stopped <$> exitCode)
+ where
+  stopped code = Verdict (FromOutside (if code == 130 then "SIGINT" else "SIGTERM")) (throwIO (ExitFailure code))

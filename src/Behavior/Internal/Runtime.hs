@@ -2,6 +2,7 @@
 {-# LANGUAGE CPP #-}
 {-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE RankNTypes #-}
+{-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
 -- The seam: everything that the library does with threads, time and blocking goes through
@@ -45,13 +46,11 @@ module Behavior.Internal.Runtime
   , sleepBetween
   , sleepToSlot
 
-    -- * Watching
-  , Event (..)
+    -- * Recording
   , annotate
   , reportUncaught
   , isRecorded
   , runClock
-  , withSink
   ) where
 
 import Control.Concurrent
@@ -70,14 +69,14 @@ import Control.Exception
   ( BlockedIndefinitelyOnSTM (..)
   , Exception (toException)
   , SomeException
-  , bracket_
+  , catch
   , onException
   , try
   , uninterruptibleMask_
   )
 import Control.Monad (when)
 import Data.Foldable (for_)
-import Data.IORef (IORef, newIORef, readIORef, writeIORef)
+import Data.IORef (newIORef, readIORef)
 import GHC.Clock (getMonotonicTime)
 import GHC.Conc (getUncaughtExceptionHandler, labelThread)
 import GHC.IORef (atomicModifyIORef'_)
@@ -92,6 +91,8 @@ import Behavior.Internal.Runtime.Counter
 import Behavior.Internal.Runtime.Dispatch
 import qualified Behavior.Internal.Runtime.TimerWheel as Timer
 import Behavior.Internal.Seconds
+import Behavior.Internal.Trace.Place (Place, inPath, myPlace)
+import Behavior.Internal.Trace.Span (branchSpan)
 
 -- | A thread that the library has started, and what it publishes as it ends.
 --
@@ -139,10 +140,11 @@ startReally :: Placement -> (Either SomeException a -> IO r) -> (r -> STM ()) ->
 startReally placement finish hook label act = do
   result <- STM.newTVarIO Nothing
   add threads 1
+  here <- myPlace
   -- The thread is masked, as the caller is: an exception is raised neither before 'try' is in
   -- place, nor between the end of the action and the publication of its outcome.
   thread <- asyncPlaced placement $ \unmask -> do
-    end <- runThread emit label (unmask act) >>= finish
+    end <- runThread here label (unmask act) >>= finish
     STM.atomically (STM.writeTVar result (Just end) >> hook end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
@@ -168,8 +170,9 @@ asyncPlaced placement act = do
 startSimulated :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread r)
 startSimulated finish hook label act simulation = do
   result <- STM.newTVarIO Nothing
-  let report event = emit event >> record simulation event
-  thread <- spawn simulation label (\begin unmask -> runThread report label (unmask (begin >> toItsEnd)) >>= finish) $ \end ->
+  here <- myPlace
+  let run unmasked = recordStart simulation >> runThread here label unmasked >>= finish
+  thread <- spawn simulation label (\begin unmask -> run (unmask (begin >> toItsEnd))) $ \end ->
     STM.writeTVar result (Just end) >> hook end
   add threads 1
   pure (Thread thread result)
@@ -178,20 +181,21 @@ startSimulated finish hook label act simulation = do
   toItsEnd = act >>= \a -> a <$ pause simulation
 {-# NOINLINE startSimulated #-}
 
--- | Runs the action, and gives how it ended. Events are passed to the given function.
-runThread :: (Event -> IO ()) -> Label -> IO a -> IO (Either SomeException a)
-runThread report label act = do
-  when labelling (labelSelf label)
-  report (Started label)
-  end <- try act
-  report (Ended label)
+-- | Runs the action in that place, and gives how it ended.
+runThread :: Maybe Place -> Label -> IO a -> IO (Either SomeException a)
+runThread here label act = do
+  when labelling (labelSelf here label)
+  end <- branchSpan label here act
   add threads (-1)
   pure end
 {-# INLINE runThread #-}
 
--- | Labels the calling thread.
-labelSelf :: Label -> IO ()
-labelSelf label = myThreadId >>= \self -> labelThread self (show label)
+-- | Labels the calling thread. (What the text of a name throws, of whatever type, must not end it; and
+-- a stop request must not be taken for that.)
+labelSelf :: Maybe Place -> Label -> IO ()
+labelSelf here label =
+  uninterruptibleMask_ $
+    (myThreadId >>= \self -> labelThread self (show label ++ inPath here)) `catch` \(_ :: SomeException) -> pure ()
 {-# NOINLINE labelSelf #-}
 
 -- | Whether labels are visible anywhere. Before GHC 9.6 only an event log shows them,
@@ -366,26 +370,18 @@ sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time)
   | otherwise =
       inSimulation (Seconds <$> Timer.sleepToSlot every t time) (\simulation -> slot <$ await simulation slot)
 
--- | While the action runs, every event is emitted to the given sink. The thread that the event
--- is about calls the sink, masked; the sink must not block.
-withSink :: (Event -> IO ()) -> IO a -> IO a
-withSink sink =
-  bracket_
-    (writeIORef eventSink (Just sink) >> add sinks 1)
-    (add sinks (-1) >> writeIORef eventSink Nothing)
-
--- | Emits the text as an event, and adds it to the simulation's record.
+-- | Adds the text to the simulation's record.
 annotate :: String -> IO ()
-annotate text = emit (Annotated text) >> inSimulation (pure ()) (\simulation -> record simulation (Annotated text))
+annotate text = inSimulation (pure ()) (`recordNote` text)
 
 -- | Passes an exception, which is not thrown, to GHC's handler for uncaught exceptions. In a
 -- simulation its text is added to the record instead.
 reportUncaught :: Exception e => e -> IO ()
 reportUncaught e =
   inSimulation (getUncaughtExceptionHandler >>= ($ toException e)) $ \simulation ->
-    record simulation (Annotated (show e))
+    recordNote simulation (show e)
 
--- | Whether events belong to the record by which a run is judged. After the end of a simulated
+-- | Whether what happens belongs to the record by which a run is judged. After the end of a simulated
 -- run its remaining threads are unwound; that does not belong to the record.
 isRecorded :: IO Bool
 isRecorded = inSimulation (pure True) recording
@@ -393,14 +389,3 @@ isRecorded = inSimulation (pure True) recording
 -- | How to read the clock of the simulation that the calling thread is part of, later too.
 runClock :: IO (Maybe (IO Seconds))
 runClock = inSimulation (pure Nothing) (pure . Just . lookAtClock)
-
--- | Emits an event to the sink, if there is one.
-emit :: Event -> IO ()
-emit event = do
-  n <- total sinks
-  when (n > 0) (readIORef eventSink >>= \sink -> for_ sink ($ event))
-{-# INLINE emit #-}
-
-eventSink :: IORef (Maybe (Event -> IO ()))
-eventSink = unsafePerformIO (newIORef Nothing)
-{-# NOINLINE eventSink #-}

@@ -21,6 +21,7 @@
 module Behavior.Internal.Scope
   ( -- * Scopes
     Scope
+  , Verdict (..)
   , structured
 
     -- * Branches
@@ -42,6 +43,7 @@ module Behavior.Internal.Scope
   , Outcome (..)
   , completedNow
   , outcomeToIO
+  , endedBy
   , result
   ) where
 
@@ -54,8 +56,6 @@ import Control.Exception
   , MaskingState (..)
   , SomeAsyncException (..)
   , SomeException (..)
-  , asyncExceptionFromException
-  , asyncExceptionToException
   , catch
   , evaluate
   , getMaskingState
@@ -70,6 +70,9 @@ import Data.Maybe (isJust)
 
 import Behavior.Internal.Failure (BehaviorFailed (..), StoppedWithFault (..), isFailure)
 import Behavior.Internal.Runtime
+import Behavior.Internal.Stop (Stop (..), causeOf, isStopOf)
+import Behavior.Internal.Trace.Event (Cause (..))
+import Behavior.Internal.Trace.Span (operatorSpan)
 
 -- | The branches that an operator has started, newest first. Only the operator's
 -- own thread starts, stops and forgets them.
@@ -109,23 +112,37 @@ data Outcome a
   | -- | Its stop was requested, and it stopped.
     Stopped SomeException
 
--- | Runs the body, which starts branches and gives a verdict (an action that returns or
--- throws); stops the branches that still run, and gives the outcome.
-structured :: (Scope -> IO (IO a)) -> IO a
-structured body = do
+-- | What an operator has decided: an action that returns or throws; and why the branches that still
+-- run are stopped.
+data Verdict a = Verdict Cause (IO a)
+
+-- | The verdict of an operator that ends as the branch with this name did.
+endedBy :: String -> Outcome a -> Verdict a
+endedBy name end = Verdict cause (outcomeToIO end)
+ where
+  cause = case end of
+    Completed _ -> SiblingFinished name
+    _ -> SiblingFailed name
+
+-- | Runs the body of the operator with this name, which starts branches and gives a verdict; stops the
+-- branches that still run, and gives the outcome.
+structured :: String -> (Scope -> IO (Verdict a)) -> IO a
+structured operator body = operatorSpan operator $ do
   state <- getMaskingState
   mask $ \restore -> do
     scope <- Scope <$> newIORef []
     -- (Written as @body scope@ it would be a thunk first, in every operator.)
     verdict <- try (restore (pure scope >>= body))
-    (thrown, faults) <- stopAll scope state (either Just (const Nothing) verdict)
+    (thrown, faults) <- case verdict of
+      Left e -> stopAll scope state (causeOf e) (Just e)
+      Right (Verdict cause _) -> stopAll scope state cause Nothing
     deadlocked <- maybe (pure False) isDeadlock thrown
     case (thrown, faults) of
       (Just e, []) | not deadlocked -> throwIO e
       (Just e, fault : _) | not deadlocked -> withFault e fault
       -- An exception thrown at the caller while it could not be interrupted is received here,
       -- and not later, when the outcome has been thrown into one of the caller's handlers.
-      (_, []) -> restore checkpoint >> either throwIO id verdict
+      (_, []) -> restore checkpoint >> either throwIO (\(Verdict _ act) -> act) verdict
       (_, fault : _) -> do
         restore checkpoint `catch` \e -> withFault e fault
         throwIO fault
@@ -140,7 +157,7 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
   (_, Just BlockedIndefinitelyOnMVar) -> True
   _ -> False
 
--- | Stops everything in the scope. Gives what has been thrown at the caller (before, or while
+-- | Stops everything in the scope, for this cause. Gives what has been thrown at the caller (before, or while
 -- this waits), and the faults from left to right.
 --
 -- A caller that is not masked can be interrupted here, as long as nothing has been thrown at
@@ -149,10 +166,10 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 -- were received here and thrown again later, a time limit could interrupt what comes after
 -- the end of that limit.)
 -- A caller that is masked cannot be interrupted here at all: it must not lose the verdict.
-stopAll :: Scope -> MaskingState -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
-stopAll (Scope branches) state before = do
+stopAll :: Scope -> MaskingState -> Cause -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
+stopAll (Scope branches) state cause before = do
   newestFirst <- readIORef branches
-  (thrown, ()) <- interruptibleOnce before (requestStop newestFirst)
+  (thrown, ()) <- interruptibleOnce before (requestStop cause newestFirst)
   fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
  where
   withFault (thrown, faults) (SomeBranch b) = do
@@ -210,16 +227,16 @@ forget (Scope branches) old = modifyIORef' branches without
 -- | Requests the stop of all the branches together, by helper threads: a branch that cannot be
 -- interrupted at the moment does not delay the request of another. It does not wait until
 -- they have stopped; so an interruption of the caller withdraws no request.
-requestStopAsync :: [SomeBranch] -> IO ()
-requestStopAsync branches = mask_ $ claimStopRequests branches >>= throwToAll Stop
+requestStopAsync :: Cause -> [SomeBranch] -> IO ()
+requestStopAsync cause branches = mask_ $ claimStopRequests branches >>= throwToAll (`Stop` cause)
 
 -- | Like 'requestStopAsync', for a caller that then waits for the end of all of them, and may
 -- block here, too: the request for a single branch needs no helper thread, and so costs less.
-requestStop :: [SomeBranch] -> IO ()
-requestStop branches = mask_ $
+requestStop :: Cause -> [SomeBranch] -> IO ()
+requestStop cause branches = mask_ $
   claimStopRequests branches >>= \case
-    [thread] -> throwToOne thread (Stop thread)
-    threads -> throwToAll Stop threads
+    [thread] -> throwToOne thread (Stop thread cause)
+    threads -> throwToAll (`Stop` cause) threads
 
 -- | The threads of the branches whose stop is still to be requested; marks it as requested.
 claimStopRequests :: [SomeBranch] -> IO [ThreadId]
@@ -279,7 +296,6 @@ classify = \case
     | Just (StoppedWithFault cause fault) <- fromException e, isStopOf self cause = Faulted $! forced fault
     | isFailure e = Failing e
     | otherwise = Faulted e
-  isStopOf self cause = fromException cause == Just (Stop self)
 
 -- | The exception; or if it is itself undefined, what it throws.
 defined :: SomeException -> IO SomeException
@@ -288,18 +304,6 @@ defined e = try (evaluate (forced e)) >>= either defined pure
 -- | The exception; evaluating it also evaluates everything that handlers match on.
 forced :: SomeException -> SomeException
 forced e@(SomeException inner)
-  | Just (BehaviorFailed failure) <- fromException e = failure `seq` e
+  | Just (BehaviorFailed _ failure) <- fromException e = failure `seq` e
   | Just (SomeAsyncException cancellation) <- fromException e = cancellation `seq` e
   | otherwise = inner `seq` e
-
--- | The exception by which an operator requests the stop of a branch. It names the branch's
--- thread: a request that reaches another thread is not taken for that thread's own.
-newtype Stop = Stop ThreadId
-  deriving (Eq)
-
-instance Show Stop where
-  show (Stop _) = "Stop: requested by the operator that started this behaviour"
-
-instance Exception Stop where
-  toException = asyncExceptionToException
-  fromException = asyncExceptionFromException

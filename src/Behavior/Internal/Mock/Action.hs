@@ -24,7 +24,8 @@ import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Script
 import Behavior.Internal.Mock.World
 import Behavior.Internal.Runtime
-import Behavior.Internal.Sim.Text
+import Behavior.Internal.SafeText
+import Behavior.Internal.Trace.Span (actionSpan)
 
 -- $setup
 -- >>> import Behavior
@@ -35,7 +36,8 @@ import Behavior.Internal.Sim.Text
 -- | Makes an action with the given name, whose n-th call follows the n-th script; the
 -- last script is used for all further calls.
 --
--- It records its beginning, its end, and the stop request if it receives one.
+-- It records its beginning, its end, and the stop request if it receives one. In a trace it is a span
+-- with its name ("Behavior.Trace").
 -- 'Succeeds' is recorded if and only if the action returns. (A cancellation may
 -- arrive right after that, as after any action.) The n-th call takes the n-th script
 -- also when calls are concurrent.
@@ -56,7 +58,7 @@ action mock name scripts = do
   checkScripts ("action " ++ show name) scripts
   registerName mock "action" name
   calls <- newIORef Map.empty
-  pure (play mock (nextCall mock calls name "" scripts))
+  pure (actionSpan name (play mock (nextCall mock calls name "" scripts)))
 
 -- | 'action' with an argument: each argument has its own scripts and its own count of
 -- calls.
@@ -75,7 +77,7 @@ actionOn mock name scripts = do
   pure $ \x -> do
     -- The scripts of an argument can be checked only when the argument is known.
     checkScripts ("action " ++ show (name ++ " " ++ show x)) (scripts x)
-    play mock (nextCall mock calls name (show x) (scripts x))
+    actionSpan (name ++ " " ++ show x) (play mock (nextCall mock calls name (show x) (scripts x)))
 
 -- | Makes a sensor with the given name, whose n-th reading follows the n-th script; the
 -- last script is used for all further readings.

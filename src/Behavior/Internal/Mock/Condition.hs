@@ -25,7 +25,7 @@ import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.World
 import Behavior.Internal.Runtime
-import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..), Worker (..), fromView)
+import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..), Worker (..), constantView, fromView, namedWith)
 
 -- $setup
 -- >>> import Behavior
@@ -40,6 +40,7 @@ import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..)
 data Condition a = Condition
   { world :: Mock
   , nameOf :: String
+  , render :: a -> String
   , current :: TVar (Maybe a)
   , ahead :: TVar [(Seconds, Maybe a)]
   -- ^ The changes to come.
@@ -82,7 +83,7 @@ partialCondition mock name changes = do
   registerName mock "condition" name
   first <- newTVarIO (initial >>= snd)
   rest <- newTVarIO (if isJust initial then drop 1 changes else changes)
-  let c = Condition mock name first rest kinds
+  let c = Condition mock name show first rest kinds
   for_ (initial >>= snd) $ \a -> recordEntry mock (entry c 0 (Is (show a)))
   registerPending mock $ \until' -> (\(_, _, made) -> made) <$> due c (<= until')
   pure c
@@ -126,11 +127,11 @@ upToDate c transaction = do
 -- > reading c  and  signal c  have the same values at the same times
 --
 -- Like every signal it waits for its first value, and fails its operator when there is
--- no value any more.
+-- no value any more. It has the condition's name ('Behavior.Signal.named').
 --
 -- @since 0.1.0.0
 signal :: Condition a -> Signal a
-signal c = Signal $ \_ -> do
+signal c = namedWith (nameOf c) (render c) . Signal $ \_ -> do
   changesByItself <- upToDate c (\_ _ -> (,) . not . null <$> readTVar (ahead c) <*> pure [])
   -- A worker that is started again after a while has missed changes: until it has made
   -- them, reads of the signal block.
@@ -144,7 +145,7 @@ signal c = Signal $ \_ -> do
       valueOr none = (readTVar caughtUp >>= check) >> readTVar (current c) >>= maybe none pure
       noneAnyMore = failWith (nameOf c ++ " has no value any more")
   pure
-    (fromView (pure (View (valueOr retry) (valueOr noneAnyMore))))
+    (fromView (pure (constantView (valueOr retry)) {reread = valueOr noneAnyMore}))
       { workers = [Worker "clock" (const wake <$ writeTVar caughtUp False) | changesByItself]
       }
 

@@ -13,13 +13,15 @@ module Behavior.Internal.Reactive.Engine
   ) where
 
 import Control.Concurrent.STM (STM, catchSTM, check)
-import Control.Exception (SomeException, throwIO)
-import Data.Maybe (catMaybes)
+import Control.Exception (SomeException, onException, throwIO)
+import Data.Maybe (catMaybes, isJust)
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
+import Behavior.Internal.Runtime (Label (..), Seconds, atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
+import Behavior.Internal.Trace.Decision
+import Behavior.Internal.Trace.Place (isTraced)
 
 -- | What an operator does for a value of the signal.
 data Reaction a
@@ -31,6 +33,8 @@ data Reaction a
     Idle
   | -- | End the operator.
     Conclude (IO a)
+  | -- | End the operator, because this time limit has passed.
+    TimeIsUp Seconds (IO a)
 
 -- | What follows a branch that has run to its end.
 data Next a = BeginAgain | EndWith a
@@ -41,12 +45,14 @@ data Engine k a = Engine
   , scope :: Scope
   , source :: Source k
   , reaction :: k -> Reaction a
+  , tracing :: Bool
+  -- ^ Whether there is a trace, which shows the named values of the signal.
   }
 
 -- | What wakes the operator.
 data Wakeup k a
   = BranchEnded (Outcome a)
-  | Changed k !(Reaction a)
+  | Changed k Values !(Reaction a)
   | SensorDied SomeException
 
 -- | Why a branch is stopped: what the operator does after the branch has ended.
@@ -61,97 +67,135 @@ react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react name signal toReaction = do
   -- (No branch has been started yet: what 'open' throws is simply thrown.)
   opened <- open (suppressEqual signal) everyValue
-  structured $ \within ->
-    startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction} FirstRead
+  inTrace <- isTraced
+  structured name $ \within ->
+    startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction, tracing = inTrace} FirstRead Nothing
 
--- | Starts the sensors, and reads the signal.
-startOver :: Eq k => Engine k a -> ReadMode -> IO (IO a)
-startOver engine how = do
+-- | Starts the sensors, and reads the signal. (The values are those of the decision before.)
+startOver :: Eq k => Engine k a -> ReadMode -> Maybe Values -> IO (Verdict a)
+startOver engine how before = do
   (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
-  select engine sensors seen how
+  select engine sensors seen how (decideOn engine Nothing before)
 
 -- | Reads the signal, and does what its value requires. No branch runs.
-select :: Eq k => Engine k a -> Sensors -> View k -> ReadMode -> IO (IO a)
-select engine sensors seen how =
-  atomically (readWakeup engine sensors (readView how seen)) >>= applyReaction engine sensors seen
+select :: Eq k => Engine k a -> Sensors -> View k -> ReadMode -> (Wakeup k a -> IO Decision) -> IO (Verdict a)
+select engine sensors seen how decided = do
+  wakeup <- atomically (readWakeup engine sensors seen (readView how seen))
+  decided wakeup >>= applyReaction engine sensors seen wakeup
 
 -- | Reads the signal. That runs users' code (views, functions, equality): what that code throws
 -- is caught here, so that any other exception in the operator's thread came from outside.
-readWakeup :: Engine k a -> Sensors -> STM k -> STM (Wakeup k a)
-readWakeup engine sensors value =
+readWakeup :: Engine k a -> Sensors -> View k -> STM k -> STM (Wakeup k a)
+readWakeup engine sensors seen value =
   sensorError sensors >>= \case
     Just dead -> pure (SensorDied dead)
-    Nothing -> (value >>= \k -> pure $! Changed k (reaction engine k)) `catchSTM` (pure . SensorDied)
+    Nothing -> changed `catchSTM` (pure . SensorDied)
+ where
+  changed = do
+    k <- value
+    values <- if tracing engine then readings seen else pure []
+    pure $! Changed k values (reaction engine k)
+
+-- | What the operator has decided, for the trace: which branch runs, and the values of the decision
+-- before.
+decideOn :: Engine k a -> Maybe Ran -> Maybe Values -> Wakeup k a -> IO Decision
+decideOn engine ran before = \case
+  Changed _ _ (TimeIsUp limit _) -> pure (timeIsUp limit)
+  Changed _ values next | isJust before || isRecovery next -> decide (operator engine) ran before values
+  Changed _ values _ -> pure (begins values)
+  _ -> pure sensorDied
+ where
+  isRecovery next = case next of
+    RunToEnd _ _ -> True
+    _ -> False
 
 -- | Does what the wakeup requires. No branch runs.
-applyReaction :: Eq k => Engine k a -> Sensors -> View k -> Wakeup k a -> IO (IO a)
-applyReaction engine sensors seen = \case
-  BranchEnded end -> pure (outcomeToIO end)
-  SensorDied e -> pure (throwIO e)
-  Changed _ (Conclude verdict) -> pure verdict
-  Changed _ (RunToEnd name recovery) -> do
-    requestStopAsync (map SomeBranch sensors)
-    recover engine sensors name recovery Nothing
-  Changed old Idle -> atomically (awaitChange old) >>= applyReaction engine sensors seen
-  Changed old (Run name act) -> do
-    running <- branch (scope engine) (Label (operator engine) name) act
+applyReaction :: Eq k => Engine k a -> Sensors -> View k -> Wakeup k a -> Decision -> IO (Verdict a)
+applyReaction engine sensors seen woken decision = case woken of
+  BranchEnded end -> pure (endedBy "branch" end)
+  SensorDied e -> concluding (throwIO e)
+  Changed _ _ (Conclude verdict) -> concluding verdict
+  Changed _ _ (TimeIsUp _ verdict) -> concluding verdict
+  Changed _ _ (RunToEnd name recovery) -> do
+    requestStopAsync (cause decision) (map SomeBranch sensors) `onException` report decision Nothing
+    recover engine sensors decision name recovery Nothing
+  Changed old values Idle -> do
+    report decision Nothing
+    change <- atomically (awaitChange old)
+    decideOn engine Nothing (Just values) change >>= applyReaction engine sensors seen change
+  Changed old values (Run name act) -> do
+    report decision (Just name)
+    ran <- branchBegins name
+    running <- starting decision (branch (scope engine) (Label (operator engine) name) act)
     -- The branch is read first: one that has ended by itself is not interrupted, whatever
     -- the signal's value is in the same transaction.
     wakeup <-
       tryReadThenBlock (fmap BranchEnded <$> tryReadOutcome running) . atomically $
         tryReadOutcomeSTM running >>= maybe (awaitChange old) (pure . BranchEnded)
+    let interrupting next = decideOn engine (Just ran) (Just values) wakeup >>= interrupt engine sensors name running next
     case wakeup of
-      BranchEnded end -> pure (outcomeToIO end)
-      SensorDied e -> interrupt engine sensors running (Finish (throwIO e))
-      Changed _ new -> interrupt engine sensors running $ case new of
+      BranchEnded end -> pure (endedBy name end)
+      SensorDied e -> interrupting (Finish (throwIO e))
+      Changed _ _ new -> interrupting $ case new of
         Conclude verdict -> Finish verdict
+        TimeIsUp _ verdict -> Finish verdict
         RunToEnd name' recovery -> Recover name' recovery
         _ -> Reselect
  where
-  awaitChange old = readWakeup engine sensors (reread seen >>= \new -> new <$ check (new /= old))
+  awaitChange old = readWakeup engine sensors seen (reread seen >>= \new -> new <$ check (new /= old))
+  concluding verdict = Verdict (cause decision) verdict <$ report decision Nothing
 
--- | Stops the branch. If it completes nevertheless, its result is that of the operator.
-interrupt :: Eq k => Engine k a -> Sensors -> Branch a -> Interruption a -> IO (IO a)
-interrupt engine sensors running = \case
+-- | Stops the branch with this name. If it completes nevertheless, its result is that of the operator.
+interrupt :: Eq k => Engine k a -> Sensors -> String -> Branch a -> Interruption a -> Decision -> IO (Verdict a)
+interrupt engine sensors name running next decision = case next of
   Finish verdict ->
-    stopBranch sensors' >>= \case
-      Stopped _ -> pure verdict
-      end -> pure (outcomeToIO end)
-  Recover name recovery ->
-    stopBranch sensors' >>= \case
-      Completed a -> pure (pure a)
-      Stopped _ -> forget (scope engine) running >> recover engine sensors name recovery Nothing
+    stopBranch sensors' >>= \(end, stopped) -> case end of
+      Stopped _ -> Verdict (cause decision) verdict <$ report stopped Nothing
+      _ -> ended stopped end
+  Recover name' recovery ->
+    stopBranch sensors' >>= \(end, stopped) -> case end of
+      Completed _ -> ended stopped end
+      Stopped _ -> forget (scope engine) running >> recover engine sensors stopped name' recovery Nothing
       -- A cleanup that threw must not keep the robot from its charger.
-      wrong -> recover engine sensors name recovery (Just (outcomeToIO wrong))
+      _ -> recover engine sensors stopped name' recovery (Just (outcomeToIO end))
   Reselect ->
-    stopBranch [] >>= \case
+    stopBranch [] >>= \(end, stopped) -> case end of
       -- Read again: meanwhile the value may have changed again, perhaps back to the old one.
       Stopped _ -> do
         forget (scope engine) running
-        seen <- atomically (view (source engine))
-        select engine sensors seen Reread
-      end -> pure (outcomeToIO end)
+        let read' = atomically (view (source engine)) >>= \seen -> (,) seen <$> atomically (readWakeup engine sensors seen (reread seen))
+        (seen, woken) <- read' `onException` report stopped Nothing
+        applyReaction engine sensors seen woken stopped
+      _ -> ended stopped end
  where
   sensors' = map SomeBranch sensors
+  ended stopped end = endedBy name end <$ report stopped Nothing
   -- Waits for the branch, but not for the others.
-  stopBranch others = requestStopAsync others >> requestStop [SomeBranch running] >> awaitOutcome running
+  stopBranch others = do
+    let stopIt = requestStopAsync (cause decision) others >> requestStop (cause decision) [SomeBranch running] >> awaitOutcome running
+    end <- stopIt `onException` report decision Nothing
+    (,) end <$> hasStopped (result end) decision
 
 -- | Runs the recovery to its end. The sensors' stop has been requested: the recovery does not
 -- wait for those that are slow to stop, but what comes after it does.
-recover :: Eq k => Engine k a -> Sensors -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (IO a)
-recover engine sensors name recovery taskOutcome = do
-  recovered <- branch (scope engine) (Label (operator engine) name) recovery
+recover :: Eq k => Engine k a -> Sensors -> Decision -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (Verdict a)
+recover engine sensors decision name recovery taskOutcome = do
+  report decision (Just name)
+  recovered <- starting decision (branch (scope engine) (Label (operator engine) name) recovery)
   end <- awaitOutcome recovered
   case (result end, taskOutcome) of
-    (_, Just verdict) -> pure verdict
-    (Left wrong, Nothing) -> pure (throwIO wrong)
-    (Right (EndWith a), Nothing) -> pure (pure a)
+    (_, Just verdict) -> concluding verdict
+    (Left wrong, Nothing) -> concluding (throwIO wrong)
+    (Right (EndWith a), Nothing) -> concluding (pure a)
     (Right BeginAgain, Nothing) -> do
       forget (scope engine) recovered
       faults <- catMaybes <$> traverse (awaitStopped (scope engine)) sensors
       case faults of
-        [] -> startOver engine Reread
-        fault : _ -> pure (throwIO fault)
+        [] -> startOver engine Reread (Just (decidedOn decision))
+        fault : _ -> concluding (throwIO fault)
+ where
+  -- (Only sensors are left, whose stop has been requested.)
+  concluding = pure . Verdict (cause decision)
 
 -- | Waits until a branch whose stop was requested has ended. If it faulted it stays
 -- in the scope, which throws its fault.

@@ -58,7 +58,7 @@ import Behavior.Internal.Signal.Source
 --
 -- @since 0.1.0.0
 rSelect :: Signal Bool -> Behavior a -> Behavior a -> Behavior a
-rSelect condition left right = react "rSelect" condition $ \case
+rSelect condition left right = react "rSelect" (unlessNamed "condition" condition) $ \case
   True -> Run "left" left
   False -> Run "right" right
 
@@ -95,7 +95,7 @@ rSelect condition left right = react "rSelect" condition $ \case
 --
 -- @since 0.1.0.0
 monitor :: Signal Bool -> Behavior () -> Behavior a -> Behavior a
-monitor condition recovery task = react "monitor" condition $ \case
+monitor condition recovery task = react "monitor" (unlessNamed "condition" condition) $ \case
   True -> RunToEnd "recovery" (BeginAgain <$ recovery)
   False -> Run "task" task
 
@@ -128,7 +128,7 @@ monitor condition recovery task = react "monitor" condition $ \case
 --
 -- @since 0.1.0.0
 insteadWhen :: Signal Bool -> Behavior a -> Behavior a -> Behavior a
-insteadWhen condition emergency act = react "insteadWhen" condition $ \case
+insteadWhen condition emergency act = react "insteadWhen" (unlessNamed "condition" condition) $ \case
   True -> RunToEnd "emergency" (EndWith <$> emergency)
   False -> Run "branch" act
 
@@ -163,7 +163,8 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
   Nothing -> Idle
   Just n -> Run ("rule " ++ show (n + 1)) (snd (rules !! n))
  where
-  firstHolding = findIndex id <$> traverse (suppressEqual . fst) rules
+  firstHolding = findIndex id <$> traverse conditionOf (zip [1 :: Int ..] rules)
+  conditionOf (n, (condition, _)) = suppressEqual (unlessNamed ("condition " ++ show n) condition)
 
 -- | Waits until the condition holds; returns at once if it does.
 --
@@ -173,7 +174,7 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
 --
 -- @since 0.1.0.0
 waitUntil :: Signal Bool -> Behavior ()
-waitUntil condition = react "waitUntil" condition $ \case
+waitUntil condition = react "waitUntil" (unlessNamed "condition" condition) $ \case
   True -> Conclude (pure ())
   False -> Idle
 
@@ -202,7 +203,7 @@ whileHolding condition behavior = react "whileHolding" (orReason condition) $ \c
 -- | Nothing while the condition holds; otherwise the reason why a guard fails.
 orReason :: Signal Bool -> Signal (Maybe String)
 orReason condition = Signal $ \demand -> do
-  source <- open condition (demand `contramapDemand` reason [])
+  source <- open (unlessNamed "condition" condition) (demand `contramapDemand` reason [])
   pure (reason (nub (names source)) <$> source)
  where
   reason _ True = Nothing

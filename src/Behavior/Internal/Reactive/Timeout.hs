@@ -54,7 +54,7 @@ timeout :: Seconds -> Behavior a -> Behavior a
 timeout seconds behavior = do
   limit <- duration "timeout" seconds
   react "timeout" (elapsed limit) $ \case
-    True -> Conclude (throwIO (TimedOut limit))
+    True -> TimeIsUp limit (throwIO (TimedOut limit))
     False -> Run "branch" behavior
 
 -- | The failure of a behaviour that took longer than the given number of seconds.
@@ -97,7 +97,7 @@ cleanupWithin :: Seconds -> Behavior a -> Behavior (Maybe a)
 cleanupWithin seconds behavior = uninterruptibleMask_ $ do
   limit <- duration "cleanupWithin" seconds
   react "cleanupWithin" (elapsed limit) $ \case
-    True -> Conclude (pure Nothing)
+    True -> TimeIsUp limit (pure Nothing)
     False -> Run "branch" (Just <$> behavior)
 
 -- | False until the given number of seconds has passed since the signal was opened.

@@ -7,7 +7,6 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Runtime.Backend
   ( Label (..)
-  , Event (..)
   , Simulator (..)
   ) where
 
@@ -29,14 +28,6 @@ instance Show Label where
   show (Label operator "") = operator
   show (Label operator branch) = operator ++ ": " ++ branch
 
--- | What is emitted while behaviours run.
-data Event
-  = Started Label
-  | Ended Label
-  | -- | A text that a behaviour emits.
-    Annotated String
-  deriving (Eq, Ord, Show)
-
 -- | The simulation backend: how a simulation does the operations of its threads.
 data Simulator = Simulator
   { isRunning :: ThreadId -> IO Bool
@@ -55,9 +46,12 @@ data Simulator = Simulator
   , pause :: IO ()
   -- ^ Lets other threads run, and lets a pending cancellation be received.
   , recording :: IO Bool
-  -- ^ Whether the run goes on, so that events belong to its record.
+  -- ^ Whether the run goes on, so that what happens belongs to its record.
   , lookAtClock :: IO Seconds
   -- ^ The current time, or the time when the run ended. Not an operation of the simulation: any
   -- thread may read it at any time.
-  , record :: Event -> IO ()
+  , recordStart :: IO ()
+  -- ^ Adds to the record that the calling thread starts.
+  , recordNote :: String -> IO ()
+  -- ^ Adds a text to the record.
   }

@@ -13,7 +13,7 @@ module Behavior.Internal.Runtime.Counter
     -- * What is counted
   , threads
   , simulations
-  , sinks
+  , traces
   ) where
 
 import Foreign (Ptr, peek)
@@ -34,5 +34,5 @@ foreign import ccall "&behavior_lang_threads" threads :: Counter
 -- | The simulations that run.
 foreign import ccall "&behavior_lang_simulations" simulations :: Counter
 
--- | The sinks to which events are emitted.
-foreign import ccall "&behavior_lang_sinks" sinks :: Counter
+-- | The traces that are being made, also those of simulations.
+foreign import ccall "&behavior_lang_traces" traces :: Counter

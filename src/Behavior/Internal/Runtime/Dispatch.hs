@@ -55,11 +55,11 @@ currentBackend = readIORef simulators >>= search . map snd
 {-# NOINLINE currentBackend #-}
 
 -- | While the action runs, the operations of the simulation's threads are dispatched to it. (The
--- number identifies the simulation.)
+-- number identifies the simulation, which has a trace.)
 withBackend :: Int -> Simulator -> IO a -> IO a
 withBackend number s =
   bracket_
-    (change ((number, s) :) >> add simulations 1)
-    (add simulations (-1) >> change (filter ((/= number) . fst)))
+    (change ((number, s) :) >> add simulations 1 >> add traces 1)
+    (add traces (-1) >> add simulations (-1) >> change (filter ((/= number) . fst)))
  where
   change f = atomicModifyIORef' simulators (\running -> (f running, ()))

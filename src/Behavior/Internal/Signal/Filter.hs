@@ -61,11 +61,10 @@ debounce seconds signal = Signal $ \demand -> do
     source
       { workers =
           workers source
-            ++ [ Worker "debounce" (reset >> const . trackChanges . ignoreErrors <$> view source)
+            ++ [ Worker "debounce" (reset >> const . trackChanges . keeping <$> view source)
                , Worker "debounce clock" (pure (const promoteAfterDelay))
                ]
-      , -- The source is read here too, so that what it throws is thrown.
-        view = mapView (*> (readTVar settled >>= maybe retry pure)) <$> view source
+      , view = showingKept settled <$> view source
       }
 
 -- | Limits the rate of changes: the first value counts at once, and so does each change, unless the
@@ -97,9 +96,8 @@ throttle seconds signal = Signal $ \demand -> do
     source
       { workers =
           workers source
-            ++ [Worker "throttle" (writeTVar passed Nothing >> const . passOn . ignoreErrors <$> view source)]
-      , -- The source is read here too, so that what it throws is thrown.
-        view = mapView (*> (readTVar passed >>= maybe retry pure)) <$> view source
+            ++ [Worker "throttle" (writeTVar passed Nothing >> const . passOn . keeping <$> view source)]
+      , view = showingKept passed <$> view source
       }
 
 -- | Whether the time that the signal gives (on the clock of 'Behavior.Time.now') is at least the given
@@ -221,6 +219,23 @@ accumulate name initial next signal = Signal $ \demand -> do
       { workers = workers source ++ [Worker name (const . remember . ignoreErrors <$> view source)]
       , view = mapView state <$> view source
       }
+
+-- | A value that a filter keeps, and its readings, from the same transaction. They do not count when it
+-- is compared.
+data Kept a = Kept {kept :: a, keptReadings :: [Reading]}
+
+instance Eq a => Eq (Kept a) where
+  a == b = kept a == kept b
+
+-- | How a worker reads the values that it keeps.
+keeping :: View a -> STM (Kept a)
+keeping seen = ignoreErrors seen >>= \a -> Kept a <$> readings seen
+
+-- | The view that shows what a filter keeps. The source is read too, so that what it throws is thrown.
+showingKept :: TVar (Maybe (Kept a)) -> View a -> View a
+showingKept variable seen = (mapView (*> (kept <$> value)) seen) {readings = keptReadings <$> value}
+ where
+  value = readTVar variable >>= maybe retry pure
 
 -- | The first read, for workers, which only wait for values. What it throws is left to the
 -- operator, which reads the value itself.

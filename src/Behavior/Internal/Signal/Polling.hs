@@ -57,7 +57,7 @@ polling every act = Signal $ \demand -> do
   newest <- newTVarIO Nothing -- the reading published last, and its generation
   next <- newIORef (-1 / 0) -- when the next reading may begin
   inFlight <- newTVarIO Nothing -- the slot of the reading in flight
-  let readings stopRequested = do
+  let readRepeatedly stopRequested = do
         t <- now
         slot <- max t <$> readIORef next
         readFrom t slot Unpublished
@@ -91,7 +91,7 @@ polling every act = Signal $ \demand -> do
       differs old new = either (const True) not <$> trySynchronous (evaluate (equalFor demand old new))
   pure
     Source
-      { workers = [Worker "polling" (readings <$ when (readingTimes demand) (writeTVar inFlight Nothing))]
+      { workers = [Worker "polling" (readRepeatedly <$ when (readingTimes demand) (writeTVar inFlight Nothing))]
       , view = do
           n <- (+ 1) <$> readTVar views
           writeTVar views n

@@ -45,7 +45,7 @@ withShared signal body = do
   closed <- newTVarIO False
   -- It is closed only when everything has ended: a thread that is still stopping may be reading
   -- it.
-  structured (sharing source closed) `finally` atomically (writeTVar closed True)
+  structured "withShared" (sharing source closed) `finally` atomically (writeTVar closed True)
  where
   sharing source closed scope = do
     sensors <- newEmptyTMVarIO
@@ -59,5 +59,5 @@ withShared signal body = do
     main <- branch scope (Label "withShared" "body") (body shared)
     (_, running) <- startSensors scope "withShared" source
     atomically (putTMVar sensors running)
-    outcomeToIO <$> atomically (outcome main)
+    endedBy "body" <$> atomically (outcome main)
   closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"

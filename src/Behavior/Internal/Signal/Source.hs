@@ -10,6 +10,8 @@ module Behavior.Internal.Signal.Source
     Signal (..)
   , watching
   , named
+  , namedWith
+  , unlessNamed
 
     -- * Opening
   , Demand (..)
@@ -21,6 +23,7 @@ module Behavior.Internal.Signal.Source
   , Source (..)
   , fromView
   , View (..)
+  , Reading
   , ReadMode (..)
   , readView
   , constantView
@@ -40,6 +43,7 @@ import Data.Traversable (for)
 import Behavior.Internal.Failure (failWith)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
+import Behavior.Internal.Trace.Place (isTraced)
 
 -- $setup
 -- >>> import Behavior
@@ -130,14 +134,20 @@ data View a = View
   -- ^ The first read: retries until there is a value, however long that takes.
   , reread :: !(STM a)
   -- ^ A later read: a value that is missing has been lost.
+  , readings :: STM [Reading]
+  -- ^ The named values that the value is made of. For traces; to be read in a transaction that has
+  -- read the value.
   }
+
+-- | The name of a signal, and the text of its value.
+type Reading = (String, String)
 
 instance Functor View where
   fmap f = mapView (fmap f)
 
 instance Applicative View where
   pure = constantView . pure
-  View f f' <*> View a a' = View (f <*> a) (f' <*> a')
+  View f f' these <*> View a a' those = View (f <*> a) (f' <*> a') ((++) <$> these <*> those)
 
 -- | Whether the operator has had a value before.
 data ReadMode = FirstRead | Reread
@@ -149,11 +159,11 @@ readView Reread = reread
 
 -- | The view whose first and later reads are the same.
 constantView :: STM a -> View a
-constantView value = View value value
+constantView value = View value value (pure [])
 
 -- | Applies the function to both ways of reading.
 mapView :: (STM a -> STM b) -> View a -> View b
-mapView f (View a a') = View (f a) (f a')
+mapView f seen = seen {firstRead = f (firstRead seen), reread = f (reread seen)}
 {-# INLINE mapView #-}
 
 -- | A thread that a source needs while it is read. It runs until its stop is requested, and can
@@ -177,12 +187,18 @@ data Worker = Worker
 --
 -- @since 0.1.0.0
 watching :: STM a -> Signal a
-watching transaction = Signal . const . pure . fromView . pure $ View transaction (transaction `orElse` noValueAnyMore)
+watching transaction = Signal . const . pure . fromView . pure $ View transaction (transaction `orElse` noValueAnyMore) (pure [])
  where
   noValueAnyMore = failWith "the signal has no value any more"
 
--- | Gives the signal a name, which 'Behavior.Signal.whileHolding' reports when it ends a behaviour.
+-- | Gives the signal a name. A trace shows it, with the signal's value before and after a change that
+-- has interrupted something ("Behavior.Trace"); 'Behavior.Signal.whileHolding' reports it when it
+-- ends a behaviour.
+--
+-- > named name  =  namedWith name show
+--
 -- What is made of the signal (by 'fmap', a filter, ...) has that name too, unless it gets its own.
+-- A trace shows both: the level of a battery, say, and that it is low.
 --
 -- >>> let wind = Signal.named "wind" (pure (12 :: Int))
 -- >>> Signal.whileHolding ((< 10) <$> wind) (putStrLn "fly")
@@ -191,8 +207,32 @@ watching transaction = Signal . const . pure . fromView . pure $ View transactio
 -- *** Exception: FailedBecause "the condition does not hold: calm"
 --
 -- @since 0.1.0.0
-named :: String -> Signal a -> Signal a
-named name signal = Signal (fmap (\source -> source {names = [name]}) . open signal)
+named :: Show a => String -> Signal a -> Signal a
+named name = namedWith name show
+
+-- | 'named', with a function for the text of a value in a trace. It is computed by the trace's sinks,
+-- outside of the operator; what it throws is shown as such.
+--
+-- >>> let position = Signal.namedWith "x" (show . fst) (pure (0.5, 1.5))
+-- >>> Signal.waitUntil ((< 1) . fst <$> position)
+--
+-- @since 0.1.0.0
+namedWith :: String -> (a -> String) -> Signal a -> Signal a
+namedWith name render signal = Signal $ \demand -> do
+  source <- open signal demand >>= showing name render
+  pure source {names = [name]}
+
+-- | The source whose readings include its value, if there is a trace, which needs them.
+showing :: String -> (a -> String) -> Source a -> IO (Source a)
+showing name render source = (\traced -> if traced then source {view = shown <$> view source} else source) <$> isTraced
+ where
+  shown seen = seen {readings = (\before a -> before ++ [(name, render a)]) <$> readings seen <*> reread seen}
+
+-- | The condition, whose readings include its value under this name, if there is no other name.
+unlessNamed :: String -> Signal Bool -> Signal Bool
+unlessNamed name signal = Signal $ \demand -> do
+  source <- open signal demand
+  if null (names source) then showing name show source else pure source
 
 -- | The threads that run for a source, from left to right.
 type Sensors = [Branch ()]

@@ -24,6 +24,7 @@ import Behavior.Internal.Sim.Prefix
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Trace.Event (Event)
 
 -- $setup
 -- >>> import Behavior
@@ -46,6 +47,7 @@ data Trial = Trial
   , deviations :: [(Int, Int)]
   -- ^ The choices that deviate from the non-preemptive schedule.
   , happened :: [Step]
+  , traceOfRun :: [Event]
   , size :: Int
   }
 
@@ -90,7 +92,7 @@ tryExplore plan property = case search plan of
   Random n seed -> randomSearch n seed
   Exhaustive k limit -> fullSearch k limit
   Replay s -> only s $ \e t ->
-    pure Counterexample {failing = s, reason = e, failingSteps = happened t, schedulesTried = 1, foundBy = plan}
+    pure Counterexample {failing = s, reason = e, failingSteps = happened t, failingEvents = traceOfRun t, schedulesTried = 1, foundBy = plan}
   Shrink s -> only s (reduced 1)
  where
   o = runOptions plan
@@ -138,7 +140,7 @@ tryExplore plan property = case search plan of
     (fewest, e'') <- simplest fewer e'
     again <- tryRun o {detailed = True} (preempting True fewest) property
     let why = fromMaybe (toException (Unrepeatable (showException plan e''))) (thrown again)
-    pure Counterexample {failing = Preempting fewest, reason = why, failingSteps = happened again, schedulesTried = i, foundBy = plan}
+    pure Counterexample {failing = Preempting fewest, reason = why, failingSteps = happened again, failingEvents = traceOfRun again, schedulesTried = i, foundBy = plan}
 
   -- Leaving out one pre-emption changes the numbers of the later points, so the remaining
   -- pre-emptions may no longer fit. So this searches from the beginning, the schedules with the
@@ -192,7 +194,7 @@ tryRun o choosing property = do
             let deviating = case schedule run of
                   Preempting s -> s
                   _ -> []
-            writeIORef made (Just (deviating, steps run, points run))
+            writeIORef made (Just (\thrown' -> Trial thrown' deviating (steps run) (events run) (points run)))
             case outcome run of
               BlockedOutside _ _ -> improper run
               ExternalWakeup _ -> improper run
@@ -201,9 +203,9 @@ tryRun o choosing property = do
               _ -> pure run
       improper run = throwIO (ErrorCall (explain (outcome run)))
   end <- try (property simulating)
-  (s, h, n) <- fromMaybe ([], [], 0) <$> readIORef made
+  trial <- fromMaybe (\thrown' -> Trial thrown' [] [] [] 0) <$> readIORef made
   case end of
-    Right () -> pure (Trial Nothing s h n)
+    Right () -> pure (trial Nothing)
     Left e
       | isCancellation e -> throwIO e
-      | otherwise -> pure (Trial (Just e) s h n)
+      | otherwise -> pure (trial (Just e))

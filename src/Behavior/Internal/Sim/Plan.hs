@@ -22,6 +22,7 @@ import Data.List (dropWhileEnd, intercalate)
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Trace.Event (Event)
 
 -- $setup
 -- >>> import Behavior
@@ -130,6 +131,8 @@ data Counterexample = Counterexample
   -- ^ The exception that the property threw.
   , failingSteps :: [Step]
   -- ^ The detailed steps.
+  , failingEvents :: [Event]
+  -- ^ The events of the run's trace.
   , schedulesTried :: Int
   -- ^ How many schedules were run until one failed.
   , foundBy :: Plan

@@ -19,7 +19,7 @@ import Numeric (showFFloat)
 
 import Behavior.Internal.Runtime.Backend (Label)
 import Behavior.Internal.Seconds (Seconds (..))
-import Behavior.Internal.Sim.Text
+import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Types
 
 -- $setup

@@ -35,7 +35,7 @@ import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.State
-import Behavior.Internal.Sim.Text
+import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
 
@@ -62,10 +62,8 @@ simulation sim =
     , pause = operation sim AlwaysEnabled
     , recording = not <$> readIORef (unwinding sim)
     , lookAtClock = readIORef (time sim)
-    , record = \event -> settle sim >> case event of
-        Started _ -> recordStep sim Starts
-        Ended _ -> pure () -- 'leave' records the end, after the result is published.
-        Annotated text -> recordStep sim (Note text)
+    , recordStart = settle sim >> recordStep sim Starts
+    , recordNote = \text -> settle sim >> recordStep sim (Note text)
     }
  where
   -- An exception for a thread that has ended is dropped.

@@ -15,6 +15,7 @@ import Control.Exception hiding (Deadlock)
 import Control.Monad (unless, when)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
+import Data.Functor.Identity (Identity (..))
 import Data.Maybe (isJust)
 import Data.Void (Void, absurd)
 import System.IO.Unsafe (unsafePerformIO)
@@ -22,12 +23,15 @@ import System.IO.Unsafe (unsafePerformIO)
 import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Dispatch
+import Behavior.Internal.SafeText (safeShow)
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Sim.Watchdog
+import Behavior.Internal.Trace.Event (Parent (Top), traverseTexts)
+import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, top, withReceiver)
 
 -- $setup
 -- >>> import Behavior
@@ -88,14 +92,17 @@ simulateBy o chooser' act = do
   result <- newIORef Nothing
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
   sim <- newSim o chooser'
+  root <- (`top` Top) <$> traceOf sim
   mask $ \restore -> withBackend n (simulation sim) . watched n sim $ do
-    (main, _) <- launch sim (-1) (Label "main" "") (\begin unmask -> try (unmask (begin >> act)) >>= writeIORef result . Just) (const (pure ()))
+    let run unmasked = try (inPlace (Just root) unmasked) >>= writeIORef result . Just
+    (main, _) <- launch sim (-1) (Label "main" "") (\begin unmask -> run (unmask (begin >> act))) (const (pure ()))
     writeIORef (current sim) main
     putMVar (gate main) ()
     verdict <- try (restore (takeMVar (runEnd sim)))
     left <- fmap taskLabel . filter (isJust . taskThread) . IntMap.elems <$> readIORef (tasks sim)
     time' <- readIORef (time sim)
     made <- reverse <$> readIORef (history sim)
+    happened <- map (runIdentity . traverseTexts (Identity . safeShow)) . reverse <$> readIORef (emitted sim)
     count <- readIORef (counter sim)
     uninterruptibleMask_ (unwind sim verdict)
     end <- readIORef result
@@ -109,6 +116,7 @@ simulateBy o chooser' act = do
             { outcome = outcomeOf v end rest
             , finished = time'
             , steps = made
+            , events = happened
             , schedule = Preempting deviating
             , points = count
             , leakedThreads = left
@@ -117,6 +125,12 @@ simulateBy o chooser' act = do
 simulationNumber :: IORef Int
 simulationNumber = unsafePerformIO (newIORef 0)
 {-# NOINLINE simulationNumber #-}
+
+-- | The trace of a run, in virtual time.
+traceOf :: Sim -> IO Trace
+traceOf sim = withReceiver Receiver {firstNumber = 1, needsDetail = True, receiveEvent = keep} <$> newTrace (readIORef (time sim))
+ where
+  keep event = event `seq` modifyIORef' (emitted sim) (event :)
 
 -- | The outcome, from how the run was ended, the behaviour's result, and the rest of the schedule.
 outcomeOf :: Maybe (Outcome Void) -> Maybe (Either SomeException a) -> [(Int, Int)] -> Outcome a

@@ -46,6 +46,7 @@ import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Trace.Event (Event)
 
 -- | A simulation.
 data Sim = Sim
@@ -81,6 +82,8 @@ data Sim = Sim
   -- ^ The choices that deviate from the non-preemptive schedule, the latest first.
   , history :: !(IORef [Step])
   -- ^ The steps, the latest first.
+  , emitted :: !(IORef [Event])
+  -- ^ The events of its trace, the latest first.
   , runEnd :: !(MVar (Maybe (Outcome Void)))
   -- ^ How the run ended; 'Nothing': as the behaviour did. The task that puts it no longer has
   -- the turn.
@@ -175,6 +178,7 @@ newSim o p = do
     <*> newIORef turnLimit
     <*> newIORef 0
     <*> newIORef 0
+    <*> newIORef []
     <*> newIORef []
     <*> newIORef []
     <*> newEmptyMVar

@@ -23,11 +23,12 @@ import Data.Maybe (isJust, isNothing)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Enabled
-import Behavior.Internal.Sim.OsSleep
+import Behavior.Internal.Runtime.OsSleep
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Trace.Place (inPath, placeOf)
 
 -- | The task that runs next. 'Nothing': the run has ended here, and the driver has the turn.
 choose :: Sim -> Maybe Task -> IO (Maybe Task)
@@ -147,9 +148,13 @@ advanceTime sim = do
 waitingTasks :: Sim -> (Task -> Bool) -> IO [Waiting]
 waitingTasks sim these = do
   alive <- IntMap.elems <$> readIORef (tasks sim)
-  waiting <- traverse (\task -> Waiting (taskLabel task) . reason alive task <$> readIORef (blockedAt task)) (filter these alive)
+  waiting <- traverse (waitingTask alive) (filter these alive)
   (waiting ++) . concat <$> traverse sent alive
  where
+  waitingTask alive task = do
+    here <- maybe (pure Nothing) placeOf (taskThread task)
+    what' <- reason alive task <$> readIORef (blockedAt task)
+    pure (Waiting (taskLabel task) (what' ++ inPath here))
   sent target = do
     all' <- readIORef (pending target)
     pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- all', isNothing (sender p)]

@@ -24,6 +24,7 @@ import Control.Exception (SomeException)
 
 import Behavior.Internal.Runtime.Backend (Label)
 import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Trace.Event (Event)
 
 -- | How to simulate.
 --
@@ -87,6 +88,9 @@ data Run a = Run
   -- ^ The virtual time when the run ended. It began at 0.
   , steps :: [Step]
   -- ^ The steps, from the beginning.
+  , events :: [Event]
+  -- ^ The events of its trace ("Behavior.Trace"), with operators and branches. What had not ended
+  -- when the run ended has no end.
   , schedule :: Schedule
   -- ^ The schedule that replays this run: a 'Preempting'.
   , points :: Int

@@ -21,7 +21,7 @@ import System.IO (hFlush, hPutStrLn, stderr)
 import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior.Internal.Seconds (Seconds (..))
-import Behavior.Internal.Sim.OsSleep
+import Behavior.Internal.Runtime.OsSleep
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn (waitingTasks)
 import Behavior.Internal.Sim.Types

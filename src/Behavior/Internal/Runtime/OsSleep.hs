@@ -5,7 +5,7 @@
 -- Sleeping in the operating system, which works even if no GHC thread can run.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Sim.OsSleep
+module Behavior.Internal.Runtime.OsSleep
   ( osSleep
   ) where
 

@@ -4,7 +4,7 @@
 -- Texts that the user's code computes.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Sim.Text
+module Behavior.Internal.SafeText
   ( safeShow
   ) where
 

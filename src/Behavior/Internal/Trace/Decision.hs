@@ -1,0 +1,123 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- What an operator reports when its signal has changed: the values, what was stopped, and what starts.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Trace.Decision
+  ( Values
+  , Ran
+  , branchBegins
+
+    -- * Deciding
+  , Decision
+  , decide
+  , begins
+  , timeIsUp
+  , sensorDied
+  , cause
+  , decidedOn
+
+    -- * Reporting
+  , hasStopped
+  , report
+  , starting
+  ) where
+
+import Control.Exception (SomeException, mask_)
+import Data.Function (on)
+import Data.List (nubBy)
+
+import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Stop (endOf)
+import Behavior.Internal.Trace.Event
+import Behavior.Internal.Trace.Place
+import Behavior.Internal.Trace.Span (newNumber, parentFor, reportEach)
+
+-- | The names of signals, and the texts of their values.
+type Values = [(String, String)]
+
+-- | A branch, and when it began.
+data Ran = Ran String !Seconds
+
+-- | The branch with this name begins now.
+branchBegins :: String -> IO Ran
+branchBegins name = Ran name <$> (myPlace >>= maybe (pure 0) (traceClock . trace))
+
+-- | An operator's decision, until what follows has been reported.
+data Decision = Decision
+  { cause :: Cause
+  -- ^ Why what is stopped now is stopped.
+  , decidedOn :: Values
+  , unreported :: !(Maybe Unreported)
+  -- ^ Nothing without a trace, and if it is no reaction to a change of a signal.
+  }
+
+data Unreported = Unreported
+  { place :: !Place
+  , ran :: !(Maybe Ran)
+  , known :: !Reaction
+  }
+
+-- | The operator with this name has decided: which branch runs, the values when it decided before, and
+-- the values now, read in the transaction that decided.
+decide :: String -> Maybe Ran -> Maybe Values -> Values -> IO Decision
+decide operator branch before after =
+  myPlace >>= \case
+    Nothing -> pure (begins [])
+    Just here -> do
+      n <- newNumber here
+      t <- traceClock (trace here)
+      let changes = [Change name (before >>= lookup name) value | (name, value) <- nubBy ((==) `on` fst) after]
+          reaction =
+            Reaction
+              { reactionNumber = n
+              , reactionParent = Top -- differs between the receivers
+              , reactionOperator = operator
+              , reactionTime = t
+              , reactionChanges = changes
+              , reactionStopped = Nothing
+              , reactionStarts = Nothing
+              }
+      pure (Decision (SignalChanged n changes) after (Just (Unreported here branch reaction)))
+
+-- | The operator only begins: there was no change.
+begins :: Values -> Decision
+begins values = Decision (SignalChanged 0 []) values Nothing
+
+-- | The time limit of an operator has passed.
+timeIsUp :: Seconds -> Decision
+timeIsUp limit = Decision (TimeLimit limit) [] Nothing
+
+-- | A sensor has failed or faulted.
+sensorDied :: Decision
+sensorDied = Decision (SiblingFailed "sensor") [] Nothing
+
+-- | The branch has ended that was stopped.
+hasStopped :: Either SomeException a -> Decision -> IO Decision
+hasStopped end decision = maybe (pure decision) stopped (unreported decision)
+ where
+  stopped what = case ran what of
+    Nothing -> pure decision
+    Just (Ran name since) -> do
+      how <- endOf end
+      t <- traceClock (trace (place what))
+      let at = reactionTime (known what)
+          branch = StoppedBranch {stoppedName = name, stoppedAfter = at - since, stoppingTook = t - at, stoppedEnd = how}
+      pure decision {unreported = Just what {known = (known what) {reactionStopped = Just branch}}}
+
+-- | Reports the reaction, and which branch starts.
+report :: Decision -> Maybe String -> IO ()
+report decision starts = mapM_ each (unreported decision)
+ where
+  each what = reportEach (place what) $ \receiver ->
+    Reacted (known what) {reactionParent = parentFor receiver (place what), reactionStarts = starts}
+
+-- | Runs an action that starts a branch: the reaction has started the spans in it.
+starting :: Decision -> IO a -> IO a
+starting decision act = maybe act within (unreported decision)
+ where
+  within Unreported {place = here, known = what} = mask_ (inPlace (Just here {amongNamed = after (amongNamed here), amongAll = after (amongAll here)}) act)
+   where
+    after position = position {startedBy = Just (reactionNumber what)}

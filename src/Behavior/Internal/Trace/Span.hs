@@ -1,0 +1,193 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- Spans: what has a name, operators, and branches.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Trace.Span
+  ( named
+  , actionSpan
+  , operatorSpan
+  , branchSpan
+  , abandonableIn
+
+    -- * For reactions
+  , newNumber
+  , reportEach
+  , parentFor
+  ) where
+
+import Control.Exception (SomeException, mask, throwIO, try)
+import Control.Monad (unless, when)
+import Data.Foldable (for_, traverse_)
+import Data.IORef (IORef, atomicModifyIORef', newIORef)
+import qualified Data.IntMap.Strict as IntMap
+import Data.Maybe (isJust)
+import Data.Traversable (for)
+
+import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Runtime.Backend (Label, Simulator (pause, recordNote))
+import Behavior.Internal.Runtime.Dispatch (inSimulation)
+import Behavior.Internal.Stop (atPath, endOf)
+import Behavior.Internal.Trace.Event
+import Behavior.Internal.Trace.Place
+
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Trace
+
+-- | Gives a behaviour a name: in a trace it is a /span/, which begins and ends, in the span around it.
+--
+-- > named name act  =  act     -- without a trace
+--
+-- Result, failure, fault and cancellation are the behaviour's. In a trace, the path of names is added
+-- to a failure of the behaviour ('Behavior.failurePath'), which is caught as before. The behaviour runs
+-- in the caller's thread and masking state. In a simulation there is a scheduling point before
+-- and one after it, as for a scripted action.
+--
+-- Without a trace it costs less than two nanoseconds, and a loop that goes on in the last step of the
+-- behaviour runs in constant space. In a trace such a loop nests: name what is in the loop.
+--
+-- > patrol = named "leg" drive >> patrol     -- not: patrol = named "leg" (drive >> patrol)
+--
+-- >>> withTrace [] (named "enter room" (named "front door" (failWith "locked")))
+-- *** Exception: enter room > front door: FailedBecause "locked"
+--
+-- @since 0.1.0.0
+named :: String -> Behavior a -> Behavior a
+named name act = isTraced >>= \traced -> if traced then namedInTrace name act else act
+{-# INLINE named #-}
+
+namedInTrace :: String -> Behavior a -> Behavior a
+namedInTrace name act = do
+  scheduling
+  spanned noting (\place -> atPath (reverse (name : path place))) name (act >>= \a -> a <$ scheduling)
+ where
+  scheduling = inSimulation (pure ()) pause
+  noting text = inSimulation (pure ()) (`recordNote` (name ++ ": " ++ text))
+{-# NOINLINE namedInTrace #-}
+
+-- | 'named' for the scripted actions of a mock world, which have scheduling points and steps of their own. Their
+-- names are not in the path of a failure: a test must see the failure that the robot sees.
+actionSpan :: String -> Behavior a -> Behavior a
+actionSpan name act = isTraced >>= \traced -> if traced then spanned (\_ -> pure ()) (const id) name act else act
+
+-- | Runs the behaviour in a span with this name. The first function is given what happens to it, for the steps
+-- of a simulated run; the second changes what it throws.
+spanned :: (String -> IO ()) -> (Place -> SomeException -> SomeException) -> String -> Behavior a -> Behavior a
+spanned noting change name act =
+  myPlace >>= \case
+    Nothing -> newestTrace >>= maybe act (\t -> inside (top t UnknownParent))
+    Just place -> inside place
+ where
+  inside place = mask $ \restore -> do
+    noting "begins"
+    end <- spanning Named name place (restore act)
+    noting "ends"
+    either (throwIO . change place) pure end
+
+-- | The span of an operator, where those are recorded.
+operatorSpan :: String -> IO a -> IO a
+operatorSpan name act = isTraced >>= \traced -> if traced then inTrace else act
+ where
+  inTrace =
+    myPlace >>= \case
+      Just place | recordsDetail (trace place) -> mask $ \restore -> spanning Operator name place (restore act) >>= either throwIO pure
+      _ -> act
+{-# INLINE operatorSpan #-}
+
+-- | Runs a branch in that place, with a span of its own where those are recorded. Call it masked, and
+-- unmask the branch.
+branchSpan :: Label -> Maybe Place -> IO a -> IO (Either SomeException a)
+branchSpan label here act = maybe (try act) (\place -> branchInTrace label place act) here
+{-# INLINE branchSpan #-}
+
+branchInTrace :: Label -> Place -> IO a -> IO (Either SomeException a)
+branchInTrace label place act
+  | recordsDetail (trace place) = spanning Branch (show label) place act
+  | otherwise = try (inPlace (Just place) act)
+{-# NOINLINE branchInTrace #-}
+
+-- | Runs the action, masked, in a span.
+spanning :: SpanKind -> String -> Place -> IO a -> IO (Either SomeException a)
+spanning kind name place act = do
+  n <- newNumber place
+  t <- traceClock (trace place)
+  open <- newIORef False >>= register . Open n kind name t place
+  reportSpan Began open
+  end <- try (inPlace (Just (within open)) act)
+  endOf end >>= \how -> endSpan how open
+  for_ (abandonable (openAt open)) (`modify` fmap (IntMap.delete n))
+  pure end
+
+-- | Registers an open span in the branches around it that may be abandoned. If one has been
+-- abandoned, the span's parent has ended: so its parent is unknown.
+register :: Open -> IO Open
+register open = do
+  inAll <- for (abandonable place) $ \spans -> atomicModifyIORef' spans (\known -> (IntMap.insert (openNumber open) open <$> known, isJust known))
+  pure (if and inAll then open else open {openAt = (top (trace place) UnknownParent) {path = path place}})
+ where
+  place = openAt open
+
+-- | Runs an action that starts a branch which may be abandoned, and gives what reports the end of the
+-- spans that are open in that branch, when it is abandoned. Call it masked.
+abandonableIn :: IO a -> IO (a, IO ())
+abandonableIn act =
+  myPlace >>= \case
+    Nothing -> (\a -> (a, pure ())) <$> act
+    Just place -> do
+      spans <- newIORef (Just IntMap.empty)
+      a <- inPlace (Just place {abandonable = spans : abandonable place}) act
+      pure (a, atomicModifyIORef' spans ((,) Nothing) >>= traverse_ (traverse_ (endSpan (StoppedBy WasAbandoned)) . reverse . IntMap.elems))
+
+-- | The place in a span.
+within :: Open -> Place
+within open = case openKind open of
+  Named -> place {amongNamed = position, amongAll = position, path = openName open : path place}
+  _ -> place {amongAll = position}
+ where
+  place = openAt open
+  position = Position {insideOf = Inside (openNumber open), startedBy = Nothing}
+
+-- | Reports the end of a span, unless that was done.
+endSpan :: End -> Open -> IO ()
+endSpan how open = do
+  done <- atomicModifyIORef' (claimed open) ((,) True)
+  unless done $ do
+    t <- traceClock (trace (openAt open))
+    reportSpan (\s -> Ended s t how) open
+
+reportSpan :: (Span -> Event) -> Open -> IO ()
+reportSpan event open = for_ (receivers (trace place)) $ \receiver ->
+  when (openKind open == Named || needsDetail receiver) . receiveEvent receiver . event $
+    Span
+      { spanNumber = openNumber open
+      , spanParent = parentFor receiver place
+      , spanKind = openKind open
+      , spanName = openName open
+      , spanBegan = openSince open
+      , spanReaction = startedBy (positionFor receiver place) >>= \n -> if n < firstNumber receiver then Nothing else Just n
+      }
+ where
+  place = openAt open
+
+-- | The span around a place, for a receiver.
+parentFor :: Receiver -> Place -> Parent
+parentFor receiver place = case insideOf (positionFor receiver place) of
+  Inside n | n < firstNumber receiver -> Top
+  parent -> parent
+
+positionFor :: Receiver -> Place -> Position
+positionFor receiver = if needsDetail receiver then amongAll else amongNamed
+
+-- | Passes an event to the receivers of the trace.
+reportEach :: Place -> (Receiver -> Event) -> IO ()
+reportEach place event = for_ (receivers (trace place)) $ \receiver -> receiveEvent receiver (event receiver)
+
+-- | The number of the next span or reaction.
+newNumber :: Place -> IO Int
+newNumber place = atomicModifyIORef' (lastNumber (trace place)) (\n -> let next = n + 1 in (next, next))
+
+modify :: IORef a -> (a -> a) -> IO ()
+modify variable f = atomicModifyIORef' variable (\a -> (f a, ()))

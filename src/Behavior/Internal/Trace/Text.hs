@@ -1,0 +1,232 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
+-- |
+-- The texts that describe events, one line each.
+--
+-- Names, values and failures are the user's texts: they are made inert first ('inert').
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Trace.Text
+  ( plainLine
+
+    -- * Parts
+  , reactionText
+  , reactionParts
+  , stoppedText
+  , startedText
+  , changesText
+  , endText
+  , howText
+  , causeText
+  , secondsText
+  , milliseconds
+  , lostText
+
+    -- * The user's texts
+  , nameText
+  , quoted
+  , inert
+  , inertUpTo
+  ) where
+
+import Data.Char (GeneralCategory (..), generalCategory)
+import Data.List (dropWhileEnd, intercalate, stripPrefix)
+import Numeric (showEFloat, showFFloat)
+
+import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Trace.Event
+
+-- $setup
+-- >>> import Behavior.Internal.Trace.Event
+-- >>> let survey = Span 2 (Inside 1) Named "survey" 4 Nothing
+-- >>> let changes = [Change "battery" (Just "100") "9.4", Change "batteryLow" (Just "False") "True"]
+-- >>> let stopped = StoppedBranch "task" 3.1 0.3 (StoppedBy (SignalChanged 5 changes))
+-- >>> let reaction = Reaction 5 (Inside 1) "monitor" 7.1 changes (Just stopped) (Just "recovery")
+
+-- | The event as one line of text: when, and what.
+--
+-- >>> putStrLn (plainLine (Began survey))
+-- 4.000 + survey
+-- >>> putStrLn (plainLine (Ended survey 6.5 (FailedWith "locked")))
+-- 6.500 - survey: failed after 2.5 s: locked
+-- >>> putStrLn (plainLine (Reacted reaction))
+-- 7.100 ! battery 9.4 (was 100) -> batteryLow True (was False) -> stopped its task after 3.1 s (took 0.3 s) -> recovery
+-- >>> putStrLn (plainLine (Lost 3))
+-- (3 events were lost here)
+--
+-- @since 0.1.0.0
+plainLine :: Event -> String
+plainLine (Began s) = milliseconds (spanBegan s) ++ " + " ++ nameText (spanName s)
+plainLine (Ended s t end) =
+  milliseconds t ++ " - " ++ nameText (spanName s) ++ ": " ++ endText (t - spanBegan s) end
+plainLine (Reacted r) = milliseconds (reactionTime r) ++ " ! " ++ reactionText [] Nothing r
+plainLine (Lost n) = "(" ++ lostText n ++ " here)"
+
+-- | What changed, what the operator stopped, and what it starts: see 'reactionParts'.
+--
+-- >>> putStrLn (reactionText ["drive"] (Just "recharge") reaction)
+-- battery 9.4 (was 100) -> batteryLow True (was False) -> stopped "drive" after 3.1 s (took 0.3 s) -> "recharge"
+reactionText :: [String] -> Maybe String -> Reaction -> String
+reactionText names started r = intercalate " -> " (changed ++ done)
+ where
+  (changed, done) = reactionParts names started r
+
+-- | The changes, each with its cause before it; and what the operator stopped, and what it starts. The
+-- arguments are the names of the spans that it stopped, and the name of the first span that it started.
+-- Where there is none, the operator's own name of the branch is used, without quotation marks.
+--
+-- >>> snd (reactionParts [] Nothing reaction)
+-- ["stopped its task after 3.1 s (took 0.3 s)","recovery"]
+-- >>> fst (reactionParts [] Nothing reaction {reactionChanges = []})
+-- ["monitor changed"]
+reactionParts :: [String] -> Maybe String -> Reaction -> ([String], [String])
+reactionParts names started r = (changed, maybe [] stopped (reactionStopped r) ++ starts)
+ where
+  changed = case reactionChanges r of
+    [] -> [nameText (reactionOperator r) ++ " changed"]
+    changes -> map changeText changes
+  stopped b = [stoppedText names b ++ " after " ++ secondsText (stoppedAfter b) ++ took b]
+  took b = " (took " ++ secondsText (stoppingTook b) ++ although (stoppedEnd b) ++ ")"
+  although Succeeded = ", it completed nevertheless"
+  although (StoppedBy _) = ""
+  although end = ", it " ++ howText end
+  starts = [startedText started branch | Just branch <- [reactionStarts r]]
+
+-- | What was stopped, given the names of the spans.
+--
+-- >>> map (\names -> stoppedText names stopped) [[], ["drive"], ["drive", "film"]]
+-- ["stopped its task","stopped \"drive\"","stopped \"drive\", \"film\""]
+stoppedText :: [String] -> StoppedBranch -> String
+stoppedText names b = "stopped " ++ case splitAt 3 names of
+  ([], _) -> "its " ++ nameText (stoppedName b)
+  (known, more) -> intercalate ", " (map quoted known) ++ concat [" and " ++ show (length more) ++ " more" | not (null more)]
+
+-- | What was started, given the name of the span, if there is one, and that of the branch.
+startedText :: Maybe String -> String -> String
+startedText started branch = maybe (nameText branch) quoted started
+
+-- | The named values after a change, those that others are computed from first.
+--
+-- >>> changesText changes
+-- "battery 9.4 (was 100) -> batteryLow True (was False)"
+-- >>> changesText []
+-- "a signal changed"
+changesText :: [Change] -> String
+changesText [] = "a signal changed"
+changesText changes = intercalate " -> " (map changeText changes)
+
+changeText :: Change -> String
+changeText (Change signal before after) = nameText signal ++ " " ++ inertUpTo 200 after ++ maybe "" was before
+ where
+  was value = " (was " ++ inertUpTo 200 value ++ ")"
+
+-- | How a span that took that long ended, and why.
+--
+-- >>> endText 1.9 (FailedWith "locked")
+-- "failed after 1.9 s: locked"
+endText :: Seconds -> End -> String
+endText took = endWith (" after " ++ secondsText took)
+
+-- | How a span ended, and why.
+--
+-- >>> map howText [Succeeded, FailedWith "the behaviour failed: locked", StoppedBy (TimeLimit 2)]
+-- ["succeeded","failed: locked","stopped: time limit of 2 s"]
+howText :: End -> String
+howText = endWith ""
+
+endWith :: String -> End -> String
+endWith after end = case end of
+  Succeeded -> "succeeded" ++ after
+  FailedWith why -> "failed" ++ after ++ because (withoutPrefix why)
+  FaultedWith why -> "faulted" ++ after ++ because why
+  StoppedBy cause -> "stopped" ++ after ++ ": " ++ causeText cause
+ where
+  because why = if null why then "" else ": " ++ inert why
+  -- So begins the text of the library's own failures.
+  withoutPrefix why = case stripPrefix "the behaviour failed" why of
+    Just "" -> ""
+    Just (':' : ' ' : reason) -> reason
+    _ -> why
+
+-- | Why a span was stopped.
+causeText :: Cause -> String
+causeText cause = case cause of
+  SignalChanged _ changes -> changesText changes
+  SiblingFinished name -> quoted name ++ " finished"
+  SiblingFailed name -> quoted name ++ " failed"
+  TimeLimit limit -> "time limit of " ++ secondsText limit
+  FromOutside why -> "cancelled from outside" ++ (if null why then "" else ": " ++ inert why)
+  WasAbandoned -> "abandoned, it may still run"
+
+-- | A duration, with three digits that count.
+--
+-- >>> map secondsText [0, 0.3, 3.14159, 0.000012345, 12345.6, 99.96]
+-- ["0 s","0.3 s","3.14 s","0.0000123 s","12346 s","100 s"]
+secondsText :: Seconds -> String
+secondsText (Seconds s)
+  | isNaN s || isInfinite s = show s ++ " s"
+  | abs s >= 1e9 = showEFloat (Just 2) s " s"
+  | s == 0 || abs s < 1e-9 = "0 s"
+  | otherwise = withoutZeros (showFFloat (Just (max 0 (2 - magnitude))) s "") ++ " s"
+ where
+  magnitude = floor (logBase 10 (abs s)) :: Int
+  withoutZeros digits
+    | '.' `elem` digits = dropWhileEnd (== '.') (dropWhileEnd (== '0') digits)
+    | otherwise = digits
+
+-- | A number of seconds with three decimal places.
+--
+-- >>> map milliseconds [3.1, -0.0001, 1e12]
+-- ["3.100","0.000","1.000e12"]
+milliseconds :: Seconds -> String
+milliseconds (Seconds t)
+  | isNaN t || isInfinite t = show t
+  | abs t >= 1e9 = showEFloat (Just 3) t ""
+  | abs t < 0.0005 = "0.000"
+  | otherwise = showFFloat (Just 3) t ""
+
+-- | How many events were lost.
+--
+-- >>> map lostText [1, 2]
+-- ["1 event was lost","2 events were lost"]
+lostText :: Int -> String
+lostText 1 = "1 event was lost"
+lostText n = show n ++ " events were lost"
+
+-- | A name between quotation marks.
+quoted :: String -> String
+quoted name = "\"" ++ nameText name ++ "\""
+
+-- | A name: 'inert', and of at most 200 characters.
+--
+-- >>> map nameText ["survey", ""]
+-- ["survey","(no name)"]
+nameText :: String -> String
+nameText name = if null name then "(no name)" else inertUpTo 200 name
+
+-- | The text on one line, without anything that a terminal or a page obeys: at most 1000
+-- characters, line breaks and tabs as spaces, and U+FFFD for each control character, each
+-- character that changes the direction of the text, and each that is not a character.
+--
+-- >>> inert "a\nb\ESC[2J\xD800"
+-- "a b\65533[2J\65533"
+inert :: String -> String
+inert = inertUpTo 1000
+
+-- | The same with at most that number of characters.
+inertUpTo :: Int -> String -> String
+inertUpTo limit text = case splitAt limit (map harmless (take (limit + 1) text)) of
+  (known, []) -> known
+  (known, _) -> take (limit - 1) known ++ "…"
+ where
+  harmless c
+    | c `elem` "\n\r\t" = ' '
+    | otherwise = case generalCategory c of
+        Control -> '\xFFFD'
+        Format -> '\xFFFD'
+        Surrogate -> '\xFFFD'
+        NotAssigned | isNoncharacter c -> '\xFFFD'
+        LineSeparator -> ' '
+        ParagraphSeparator -> ' '
+        _ -> c
+  isNoncharacter c = (c >= '\xFDD0' && c <= '\xFDEF') || fromEnum c `mod` 0x10000 >= 0xFFFE
