@@ -1,0 +1,103 @@
+{-# LANGUAGE LambdaCase #-}
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- The program @behavior-trace@.
+module Tool
+  ( run
+  ) where
+
+import Control.Exception (IOException, displayException, try)
+import Control.Monad (when)
+import Control.Monad.Trans.Except (ExceptT (..), runExceptT, throwE)
+import qualified Data.ByteString as Strict
+import qualified Data.ByteString.Lazy as Lazy
+import Data.Text.Lazy.Encoding (encodeUtf8)
+import Options.Applicative
+import System.Directory (canonicalizePath)
+import System.Exit (ExitCode (..))
+
+import Behavior.Trace (Event)
+import Behavior.Trace.Describe (inert)
+import Behavior.Trace.Diff
+import Behavior.Trace.File
+import Behavior.Trace.Recording
+import Behavior.Trace.Summary
+import Behavior.Trace.Svg
+import Behavior.Trace.TraceEvents
+import Behavior.Trace.Tree
+
+data Options = Options FilePath Mode
+
+data Mode
+  = -- | Prints a text.
+    Print (Recording -> String)
+  | -- | Writes a file.
+    Write (Recording -> Lazy.ByteString) FilePath
+  | -- | Compares with another file.
+    Compare FilePath
+
+-- | Runs the program with these arguments. The result is its exit status, and what it prints on the
+-- standard output and on the standard error output.
+run :: [String] -> IO (ExitCode, String, String)
+run arguments = case execParserPure defaultPrefs commandLine arguments of
+  Success (Options file mode) -> do
+    result <- runExceptT (load file >>= uncurry (perform file mode))
+    pure $ case result of
+      Left problem -> (ExitFailure 2, "", problem ++ "\n")
+      Right (printed, remarks) -> (ExitSuccess, printed, unlines remarks)
+  Failure failure -> case renderFailure failure "behavior-trace" of
+    (text, ExitSuccess) -> pure (ExitSuccess, text ++ "\n", "")
+    (text, status) -> pure (status, "", text ++ "\n")
+  CompletionInvoked completion -> do
+    text <- execCompletion completion "behavior-trace"
+    pure (ExitSuccess, text, "")
+
+commandLine :: ParserInfo Options
+commandLine =
+  info (helper <*> (Options <$> strArgument (metavar "FILE" <> help "the file of a trace") <*> modes)) $
+    fullDesc
+      <> failureCode 2
+      <> progDesc "Shows what a robot did, since when, and what interrupted it."
+      <> footer
+        "Exit status: 0, or 2 if the options are wrong or a file cannot be read or written. A last line \
+        \that is incomplete, because the program was killed, is no error."
+
+modes :: Parser Mode
+modes =
+  flag' (Print renderTree) (long "tree" <> help "print what ran, one inside the other, and how it ended")
+    <|> flag' (Print (renderSummary . summary)) (long "summary" <> help "print where the time went, what interrupted, and what failed")
+    <|> writing "svg" (encodeUtf8 . timeline) "draw the timeline: one SVG file, which a browser shows"
+    <|> writing "trace-events" renderTraceEvents "write the trace-event format, for Perfetto, Chrome and speedscope"
+    <|> Compare <$> strOption (long "diff" <> metavar "OTHER" <> help "print what another trace has differently")
+ where
+  writing name render what = Write render <$> strOption (long name <> metavar "OUT" <> help what)
+
+perform :: FilePath -> Mode -> [Event] -> [String] -> ExceptT String IO (String, [String])
+perform file mode events remarks = case mode of
+  Print render -> pure (render (recording events), remarks)
+  Write render out -> do
+    same <- attempt ((==) <$> canonicalizePath file <*> canonicalizePath out)
+    when same (throwE (inert out ++ ": this is the file of the trace; allowed: another file"))
+    attempt (Lazy.writeFile out (render (recording events)))
+    pure ("", remarks)
+  Compare other -> do
+    (events', remarks') <- load other
+    pure (renderDifference (difference (recording events) (recording events')), remarks ++ remarks')
+
+-- The events of a file, and a remark if its last line is incomplete.
+load :: FilePath -> ExceptT String IO ([Event], [String])
+load file = do
+  content <- attempt (Strict.readFile file)
+  case parseTrace (Lazy.fromStrict content) of
+    Left problem -> throwE (inert file ++ ": " ++ explainTraceError problem)
+    Right (_, events, torn) -> pure (events, maybe [] (pure . remark) torn)
+ where
+  remark (TornLine n bytes) =
+    inert file ++ ": line " ++ show n ++ ": incomplete (" ++ show bytes
+      ++ " bytes), and left out: the program was killed, or is still writing"
+
+attempt :: IO a -> ExceptT String IO a
+attempt io = ExceptT $ try io >>= \case
+  Left (e :: IOException) -> pure (Left (inert (displayException e)))
+  Right a -> pure (Right a)

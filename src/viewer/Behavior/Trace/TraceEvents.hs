@@ -1,0 +1,195 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- A recording in the trace-event format, which Perfetto, Chrome (@about:tracing@) and speedscope open.
+module Behavior.Trace.TraceEvents
+  ( renderTraceEvents
+  , Placed (..)
+  , placed
+  ) where
+
+import Data.Aeson.Encoding (Encoding, int, pair, pairs, unsafeToEncoding)
+import Data.ByteString.Builder (char7, string7, toLazyByteString)
+import qualified Data.ByteString.Lazy as Lazy
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
+import Data.List (foldl', intersperse, sortOn)
+import Data.Maybe (listToMaybe)
+import qualified Data.Set as Set
+
+import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Trace
+import Behavior.Trace.Describe
+import Behavior.Trace.Json
+import Behavior.Trace.Recording
+
+-- | The bytes of the file. A span is a complete event; one that has not ended lasts until the end
+-- of the recording, and its outcome is @not ended@. A lane (a thread, for the viewers) contains only
+-- spans that are one inside the other or one after the other. From a span that a reaction stopped,
+-- a flow leads to each span that the reaction started. Times are relative to the beginning of the
+-- recording.
+--
+-- @since 0.1.0.0
+renderTraceEvents :: Recording -> Lazy.ByteString
+renderTraceEvents r =
+  toLazyByteString $
+    "{\"displayTimeUnit\":\"ms\",\"otherData\":" <> written (pairs (pair "lostEvents" (int (lost r))))
+      <> ",\"traceEvents\":[\n"
+      <> mconcat (intersperse ",\n" (map written (process : map laneName lanes ++ map complete spans ++ flows r spans)))
+      <> char7 '\n'
+      <> "]}\n"
+ where
+  spans = placed r
+  lanes = Set.toList (Set.fromList (map lane spans))
+
+-- | A span in its lane. Its times are whole nanoseconds since the beginning of the recording.
+--
+-- @since 0.1.0.0
+data Placed = Placed
+  { lane :: !Int
+  , begins :: !Integer
+  , ends :: !Integer
+  , placedNode :: Node
+  , stoppedInside :: !Bool
+  -- ^ The reaction that stopped it stopped its parent too.
+  }
+
+-- A span, and those that it is in.
+data Nested = Nested
+  { interval :: (Integer, Integer)
+  , nested :: Node
+  , outside :: [Int]
+  , outsideStoppedBy :: Maybe Int
+  }
+
+-- | All spans in their lanes, in the order in which they begin. A span is in the lane of its parent,
+-- unless a sibling is there at that time or the span lasts longer than its parent.
+--
+-- @since 0.1.0.0
+placed :: Recording -> [Placed]
+placed r = reverse (placedSpans (foldl' place (Lanes IntMap.empty Set.empty IntMap.empty []) ordered))
+ where
+  -- Of those that begin at the same time, a span comes before those in it.
+  ordered = sortOn (fst . interval) (concatMap (below [] Nothing) (roots r))
+  below outer stopping n =
+    Nested (begin, max begin (nanoseconds (nodeUntil r n) - start)) n outer stopping
+      : concatMap (below (spanNumber (nodeSpan n) : outer) (stoppedBy n)) (nodeChildren n)
+   where
+    begin = nanoseconds (spanBegan (nodeSpan n)) - start
+  start = nanoseconds (from r)
+
+-- In each lane, the spans that have begun and not ended: the innermost first, with its number and
+-- its end. And when each lane becomes free.
+data Lanes = Lanes
+  { open :: !(IntMap [(Int, Integer)])
+  , freeAt :: !(Set.Set (Integer, Int))
+  , laneOf :: !(IntMap Int)
+  , placedSpans :: [Placed]
+  }
+
+place :: Lanes -> Nested -> Lanes
+place lanes n =
+  Lanes
+    { open = IntMap.insert chosen ((number', end) : around) (open lanes)
+    , freeAt = if null around then Set.insert (end, chosen) (forget (freeAt lanes)) else freeAt lanes
+    , laneOf = IntMap.insert number' chosen (laneOf lanes)
+    , placedSpans = Placed chosen begin end (nested n) inside : placedSpans lanes
+    }
+ where
+  (begin, end) = interval n
+  number' = spanNumber (nodeSpan (nested n))
+  inside = maybe False ((== outsideStoppedBy n) . Just) (stoppedBy (nested n))
+  around = openIn chosen
+  chosen = case parentLane of
+    Just l | fits (openIn l) -> l
+    _ -> case Set.lookupMin (freeAt lanes) of
+      Just (time, l) | time <= begin -> l
+      _ -> IntMap.size (open lanes) + 1
+  parentLane = listToMaybe (outside n) >>= \parent -> IntMap.lookup parent (laneOf lanes)
+  openIn l = dropWhile ((<= begin) . snd) (IntMap.findWithDefault [] l (open lanes))
+  -- In no other span than those that it really ran in.
+  fits [] = True
+  fits ((enclosing, enclosingEnd) : _) = enclosing `elem` outside n && end <= enclosingEnd
+  -- The lane is no longer free from when it was.
+  forget free = case IntMap.lookup chosen (open lanes) of
+    Just known | not (null known) -> Set.delete (snd (last known), chosen) free
+    _ -> free
+
+stoppedBy :: Node -> Maybe Int
+stoppedBy n = case nodeEnd n of
+  Just (_, StoppedBy (SignalChanged reaction _)) -> Just reaction
+  _ -> Nothing
+
+-- Infinite times and such of damaged recordings are limited to what fits a number of 64 bits.
+nanoseconds :: Seconds -> Integer
+nanoseconds (Seconds t)
+  | isNaN t = 0
+  | otherwise = round (max (-4e9) (min 4e9 t) * 1e9)
+
+process :: Encoding
+process =
+  pairs $
+    pair "ph" (text "M") <> pair "pid" (int 1) <> pair "name" (text "process_name")
+      <> pair "args" (pairs (pair "name" (text "behavior")))
+
+laneName :: Int -> Encoding
+laneName l =
+  pairs $
+    pair "ph" (text "M") <> pair "pid" (int 1) <> pair "tid" (int l) <> pair "name" (text "thread_name")
+      <> pair "args" (pairs (pair "name" (text ("lane " ++ show l))))
+
+complete :: Placed -> Encoding
+complete p =
+  pairs $
+    pair "ph" (text "X")
+      <> pair "pid" (int 1)
+      <> pair "tid" (int (lane p))
+      <> pair "ts" (microseconds (begins p))
+      <> pair "dur" (microseconds (ends p - begins p))
+      <> pair "name" (text (nameText (spanName (nodeSpan (placedNode p)))))
+      <> pair "cat" (text (kind (spanKind (nodeSpan (placedNode p)))))
+      <> pair "args" (pairs (pair "outcome" (text (outcome (snd <$> nodeEnd (placedNode p))))))
+ where
+  kind Named = "named"
+  kind Operator = "operator"
+  kind Branch = "branch"
+
+-- A flow needs both of its ends, each in a span, and the first one earlier. Of the spans that a
+-- reaction stopped, the outermost one is meant.
+flows :: Recording -> [Placed] -> [Encoding]
+flows r spans = concat (zipWith flow [1 ..] interruptions)
+ where
+  interruptions =
+    [ (reaction, stopped, started, at)
+    | (reaction, startedSpans) <- IntMap.toList startedBy
+    , Just stopped <- [IntMap.lookup reaction stoppedFirst]
+    , let at = leaves reaction stopped
+    , started <- startedSpans
+    , at <= begins started
+    ]
+  startedBy = IntMap.fromListWith (++) [(n, [p]) | p <- reverse spans, Just n <- [spanReaction (nodeSpan (placedNode p))]]
+  stoppedFirst =
+    IntMap.fromListWith (\_ first -> first) [(n, p) | p <- spans, not (stoppedInside p), Just n <- [stoppedBy (placedNode p)]]
+  -- When the operator decided. A viewer looks for the span in which the flow begins; at its very end
+  -- it finds none.
+  leaves n p = max (begins p) (min (ends p - 1) (IntMap.findWithDefault (ends p) n decided))
+  decided = IntMap.fromList [(reactionNumber x, nanoseconds (reactionTime x) - nanoseconds (from r)) | x <- reactions r]
+  flow :: Int -> (Int, Placed, Placed, Integer) -> [Encoding]
+  flow n (_, stopped, started, at) =
+    [ pairs (pair "ph" (text "s") <> common n (lane stopped) at)
+    , pairs (pair "ph" (text "f") <> pair "bp" (text "e") <> common n (lane started) (begins started))
+    ]
+  common n l at =
+    pair "id" (int n)
+      <> pair "pid" (int 1)
+      <> pair "tid" (int l)
+      <> pair "ts" (microseconds at)
+      <> pair "name" (text "interruption")
+      <> pair "cat" (text "interruption")
+
+-- With all digits: a rounded end could be after that of the parent.
+microseconds :: Integer -> Encoding
+microseconds n = unsafeToEncoding (string7 (show whole) <> (if part == 0 then mempty else string7 ('.' : decimals)))
+ where
+  (whole, part) = n `divMod` 1000
+  decimals = reverse (dropWhile (== '0') (reverse (replicate (3 - length (show part)) '0' ++ show part)))

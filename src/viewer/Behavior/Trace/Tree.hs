@@ -1,0 +1,87 @@
+-- |
+-- A recording as a tree of text.
+module Behavior.Trace.Tree
+  ( renderTree
+  ) where
+
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
+import Data.List (sortOn)
+import Data.Maybe (listToMaybe)
+import Prelude hiding (until)
+
+import Behavior.Time (Seconds)
+import Behavior.Trace
+import Behavior.Trace.Describe
+import Behavior.Trace.Recording
+
+-- $setup
+-- >>> import Behavior.Trace
+-- >>> import Behavior.Trace.Recording
+
+-- | A line for each span and each reaction: when it began, how long it took, its name, how it ended
+-- and why. A span's line comes before those of what ran in it, which are indented. An interruption
+-- has an exclamation mark.
+--
+-- >>> let mission = Span 1 Top Named "mission" 0 Nothing
+-- >>> let door = Span 2 (Inside 1) Named "front door" 1.5 Nothing
+-- >>> putStr (renderTree (recording [Began mission, Ended door 2 (FailedWith "locked"), Ended mission 4 Succeeded]))
+--   begin [s]  took [s]
+--       0.000     4.000  mission: succeeded
+--       1.500     0.500    front door: failed: locked
+--
+-- @since 0.1.0.0
+renderTree :: Recording -> String
+renderTree r = unlines (heading : concatMap snd (sortOn fst (loose ++ map (branch 0) (roots r))) ++ remark)
+ where
+  heading = row "begin [s]" "took [s]" ""
+  branch :: Int -> Node -> (Seconds, [String])
+  branch depth node =
+    ( spanBegan s
+    , row (milliseconds (spanBegan s)) (milliseconds (nodeUntil r node - spanBegan s)) (indented depth (title node))
+        : concatMap snd (sortOn fst (reacted (depth + 1) (spanNumber s) ++ map (branch (depth + 1)) (nodeChildren node)))
+    )
+   where
+    s = nodeSpan node
+  reacted depth n = map (reaction depth) (IntMap.findWithDefault [] n inside)
+  reaction depth x =
+    (reactionTime x, [row (milliseconds (reactionTime x)) "" (indented depth ("! " ++ described x))])
+  described x = reactionText (map spanName stopped) (spanName <$> listToMaybe started) x
+   where
+    (stopped, started) = IntMap.findWithDefault ([], []) (reactionNumber x) involved
+  involved = reactionSpans r
+  -- Those of no span that is known.
+  loose = map (reaction 0) (IntMap.findWithDefault [] 0 inside)
+  inside = reactionsInside r
+  remark = [lostRemark (lost r) | lost r /= 0]
+
+-- | The reactions by the number of the span in which their operator ran; 0: in none that is known.
+reactionsInside :: Recording -> IntMap [Reaction]
+reactionsInside r = IntMap.fromListWith (++) [(parent x, [x]) | x <- reverse (reactions r)]
+ where
+  parent x = case reactionParent x of
+    Inside n | IntMap.member n known -> n
+    _ -> 0
+  known = IntMap.fromList [(spanNumber (nodeSpan node), ()) | node <- nodes r]
+
+title :: Node -> String
+title node = nameText (spanName s) ++ ": " ++ outcome (snd <$> nodeEnd node) ++ kind ++ origin
+ where
+  s = nodeSpan node
+  kind = case spanKind s of
+    Named -> ""
+    Operator -> " [operator]"
+    Branch -> " [branch]"
+  origin = if spanParent s == UnknownParent then " [it is not known what it ran in]" else ""
+
+row :: String -> String -> String -> String
+row begin took text = padLeft 11 begin ++ padLeft 10 took ++ (if null text then "" else "  " ++ text)
+
+-- Deep trees stay on the screen.
+indented :: Int -> String -> String
+indented depth text
+  | depth <= 40 = replicate (2 * depth) ' ' ++ text
+  | otherwise = replicate 80 ' ' ++ "(" ++ show depth ++ " deep) " ++ text
+
+padLeft :: Int -> String -> String
+padLeft n text = replicate (n - length text) ' ' ++ text
