@@ -21,6 +21,7 @@ import Behavior.Message (handleNext, onMessage, withInbox)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (abandoning, atomically, timeout)
+import Behavior.Trace (named, withTrace)
 import Support
 
 -- | A place in an operator. All other branches of the operator do nothing: when the
@@ -51,6 +52,8 @@ places =
       fallbackOver [False, True] (\isLast -> if isLast then act else failed)
   , inPlace "attempt" (attempt 1)
   , inPlace "failingOn" (failingOn noException)
+  , inPlace "named" (named "name")
+  , inPlace "named, in a trace" (withTrace [] . named "name")
   , inThread "parallel" "left" (`parallel` hang)
   , inThread "parallel" "right" (hang |||)
   , inThread "both" "left" (`both` pure ())

@@ -6,7 +6,7 @@
 --
 -- The first round is what a release requires, however long it takes: a hundred thousand
 -- random schedules of each promise, and as many random programs compared with the
--- specification. Without a number of seconds only the first round is run.
+-- specification, and with their traces. Without a number of seconds only the first round is run.
 module Main (main) where
 
 import Control.Monad (forM, forM_, unless, when)
@@ -24,6 +24,7 @@ import Promises.Properties
 import Promises.Stage
 import Promises.Trying
 import SemanticsSpec (allThatIsAllowed, onlyWhatIsAllowed)
+import Trace.ProgramsSpec (sinksChangeNothing, tracedRight)
 
 main :: IO ()
 main = do
@@ -57,6 +58,9 @@ oneRound n = do
   putStrLn "The specification"
   checks "random programs, each run a path of the relation" 100000 onlyWhatIsAllowed
   checks "small programs, both sets of outcomes equal" 500 allThatIsAllowed
+  putStrLn "Traces"
+  checks "random programs, each with the trace that it must have" 100000 tracedRight
+  checks "random programs, with sinks and without" 10000 sinksChangeNothing
   pure (mconcat promised')
 
 checks :: String -> Int -> Property -> IO ()

@@ -60,6 +60,10 @@ import qualified Sim.QuickCheckSpec
 import qualified Sim.RecordSpec
 import qualified Sim.SimulateSpec
 import qualified Sim.SlipSpec
+import qualified Trace.MessagesSpec
+import qualified Trace.ProgramsSpec
+import qualified Trace.SinkSpec
+import qualified Trace.TraceSpec
 
 main :: IO ()
 main = hspec $ do
@@ -112,9 +116,15 @@ main = hspec $ do
     Sim.RecordSpec.spec
     Sim.MockSpec.spec
     Sim.QuickCheckSpec.spec
+  describe "Traces" $ do
+    Trace.TraceSpec.spec
+    Trace.SinkSpec.spec
   describe "Reality" Reality.RealitySpec.spec
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
   describe "Specification" SemanticsSpec.spec
+  describe "Traces of random programs" $ do
+    Trace.ProgramsSpec.spec
+    Trace.MessagesSpec.spec
   describe "The paper" $ do
     Paper.ListingsSpec.spec
     Paper.DoorsSpec.spec

@@ -1,3 +1,4 @@
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
@@ -41,6 +42,10 @@ module Support
   , awaitOver
   , eventually
 
+    -- * The threads that the library starts
+  , ThreadEvent (..)
+  , watchingThreads
+
     -- * How an action ends
   , Ending (..)
   , ending
@@ -76,8 +81,11 @@ import Behavior
   , behaviorFailedFromException
   , behaviorFailedToException
   )
-import Behavior.Internal.Failure (isCancellation, isFailure)
-import Behavior.Internal.Runtime (atomically, liveThreadCount)
+import Behavior.Internal.Failure (BehaviorFailed (..), isCancellation)
+import Behavior.Internal.Runtime (Label (..), atomically, liveThreadCount)
+import Behavior.Internal.Trace.Place
+import Behavior.Trace (adopt)
+import qualified Behavior.Trace as Trace
 
 -- | Wraps every spec: each example must end within twenty seconds (it needs at most
 -- one, unless the machine is very busy), and must leave no thread of the library
@@ -160,7 +168,26 @@ notes (Log events) = reverse <$> readTVarIO events
 -- | Runs the action in a thread of its own while the second action observes and
 -- interrupts it; when the second action ends, the first is cancelled.
 withThread :: IO a -> (Async a -> IO b) -> IO b
-withThread = withAsync
+withThread act body = adopt >>= \here -> withAsync (here act) body
+
+-- | A thread that the library starts begins or ends.
+data ThreadEvent = Started Label | Ended Label
+  deriving (Eq, Show)
+
+-- | Passes what the threads do that are started within the action to the function: each thread calls it
+-- itself, masked.
+watchingThreads :: (ThreadEvent -> IO ()) -> IO a -> IO a
+watchingThreads f act = do
+  here <- myPlace
+  whole <- withReceiver Receiver {firstNumber = 1, needsDetail = True, receiveEvent = traverse_ f . threadEvent} <$> maybe (newTrace (pure 0)) (pure . trace) here
+  mask $ \restore -> withLiveTrace whole (inPlace (Just (maybe (top whole Trace.Top) (\place -> place {trace = whole}) here)) (restore act))
+ where
+  threadEvent = \case
+    Trace.Began s | isThread s -> Just (Started (labelOf s))
+    Trace.Ended s _ _ | isThread s -> Just (Ended (labelOf s))
+    _ -> Nothing
+  isThread s = Trace.spanKind s == Trace.Branch
+  labelOf s = let (op, rest) = break (== ':') (Trace.spanName s) in Label op (drop 2 rest)
 
 -- | Runs the first action as a caller, in a thread of its own; runs the second action;
 -- then cancels the caller and returns how it ended.
@@ -237,7 +264,8 @@ endingOf (Left e)
   | Just (StoppedWithFault cause fault) <- fromException e =
       CancelledWithFault (show cause) (show fault)
   | isCancellation e = CancelledBy (show e)
-  | isFailure e = FailedWith (show e)
+  -- (Without its path: an operator that adds to that, gives the same failure.)
+  | Just (BehaviorFailed _ failure) <- fromException e = FailedWith (show failure)
   | otherwise = FaultedWith (show e)
 
 -- | A bug in users' code.

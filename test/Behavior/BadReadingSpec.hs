@@ -15,7 +15,8 @@ import Test.Hspec
 
 import Behavior (Failed)
 import Behavior.Internal.Runtime (atomically, now)
-import Behavior.Internal.Scope (SomeBranch (..), requestStopAsync, outcome, structured)
+import Behavior.Internal.Scope (Verdict (..), SomeBranch (..), requestStopAsync, outcome, structured)
+import Behavior.Internal.Trace.Event (Cause (..))
 import Behavior.Internal.Signal.Source (startSensors)
 import qualified Behavior.Internal.Signal.Source as Source
 import qualified Behavior.Signal as Signal
@@ -192,34 +193,34 @@ stale = do
     source <- Source.open (Signal.polling (1 / 0) (pure ())) Source.everyValue {Source.readingTimes = True}
     let reading = Source.inFlightSince source
     atomically reading `shouldReturn` Nothing
-    structured $ \scope -> do
+    structured "test" $ \scope -> do
       (seen, _) <- startSensors scope "test" source
       atomically (Source.firstRead seen)
       atomically reading `shouldReturn` Nothing
-      pure (pure ())
+      pure (Verdict (SiblingFinished "test") (pure ()))
 
   it "does not count the time of a recovery for which a reading was stopped" $ do
     entered <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> hang)
     source <- Source.open (sensing level) Source.everyValue {Source.readingTimes = True}
     let reading = Source.inFlightSince source
-    structured $ \scope -> do
+    structured "test" $ \scope -> do
       (_, workers) <- startSensors scope "test" source
       pass entered
       began <- atomically reading
       began `shouldSatisfy` isJust
-      requestStopAsync (map SomeBranch workers)
+      requestStopAsync (SiblingFinished "test") (map SomeBranch workers)
       for_ workers (atomically . outcome)
       _ <- startSensors scope "test" source
       atomically reading >>= (`shouldSatisfy` (/= began))
-      pure (pure ())
+      pure (Verdict (SiblingFinished "test") (pure ()))
 
   it "still fails when the reading that was overdue has ended" $ do
     entered <- newGate
     mayEnd <- newGate
     level <- newSensor $ \n -> when (n == 1) (open entered >> pass mayEnd)
     source <- Source.open (Signal.staleAfter 0.001 (sensing level)) Source.everyValue
-    structured $ \scope -> do
+    structured "test" $ \scope -> do
       (seen, _) <- startSensors scope "test" source
       let isStale view = atomically ((False <$ Source.firstRead view) `catchSTM` \(_ :: Failed) -> pure True)
       pass entered
@@ -228,7 +229,7 @@ stale = do
       -- For a view that is made later, the reading has ended in time.
       eventually $ not <$> (atomically (Source.view source) >>= isStale)
       isStale seen `shouldReturn` True
-      pure (pure ())
+      pure (Verdict (SiblingFinished "test") (pure ()))
 
   it "never fails a signal that is not polled" $ do
     condition <- newTestCondition True

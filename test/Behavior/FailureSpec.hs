@@ -312,7 +312,7 @@ failingOns = do
   it "turns a chosen fault into a failure that holds it" $ do
     let bug (Fault why) = why == "no device"
     (failingOn bug (throwIO (Fault "no device")) ? pure ()) `shouldReturn` ()
-    (failingOn bug (throwIO (Fault "no device")) `catch` \(BehaviorFailed e) -> pure (show e))
+    (failingOn bug (throwIO (Fault "no device")) `catch` \(BehaviorFailed _ e) -> pure (show e))
       `shouldReturn` show (Fault "no device")
 
   it "leaves a fault unchanged that is not chosen, by its value or by its type" $ do

@@ -187,7 +187,7 @@ undefinedExceptions = do
   exceptions =
     [ ("SomeException", throwIO (throw (Fault "undefined") :: SomeException))
     , ("BehaviorFailed", throwIO (throw (Fault "undefined") :: BehaviorFailed))
-    , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed (throw (Fault "undefined") :: Failed)))
+    , ("a failure inside BehaviorFailed", throwIO (BehaviorFailed [] (throw (Fault "undefined") :: Failed)))
     , ("SomeAsyncException", throwIO (throw (Fault "undefined") :: SomeAsyncException))
     , ("a cancellation inside SomeAsyncException", throwIO (SomeAsyncException (throw (Fault "undefined") :: Cancel)))
     , ("a user's own type", throwIO (throw (Fault "undefined") :: Fault))

@@ -11,7 +11,7 @@ import Control.Monad (replicateM_, void, when)
 import Data.Foldable (for_)
 import Test.Hspec
 
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, withSink)
+import Behavior.Internal.Runtime (Label (..), atomically)
 import Support
 import Watched
 
@@ -118,7 +118,7 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
           again <- (> 1) . length <$> notes visits
           if again then pure "main" else open entered >> hang
         other = recovered op condition >> pure "other"
-    withSink (note events) $
+    watchingThreads (note events) $
       withThread (running op (watched condition) main other) $ \caller -> do
         pass entered
         set condition (Value False)

@@ -16,7 +16,7 @@ import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, withSink)
+import Behavior.Internal.Runtime (Label (..), atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (now, timeout)
 import Support hiding (Failure)
@@ -186,7 +186,7 @@ monitoring = do
           aWhile 0.002
           readings level `shouldReturn` earlier
         watch event = when (event == Ended (Label "monitor" "polling")) (open resting)
-    withSink watch (monitor (sensor level) recovery (pure "task")) `shouldReturn` "task"
+    watchingThreads watch (monitor (sensor level) recovery (pure "task")) `shouldReturn` "task"
 
   it "labels its threads, and starts a new one to read after each recovery" $ do
     recoveries <- newTVarIO (0 :: Int)
@@ -201,7 +201,7 @@ monitoring = do
 startedBy :: IO a -> IO [Label]
 startedBy act = do
   events <- newLog
-  _ <- withSink (note events) act
+  _ <- watchingThreads (note events) act
   notes events >>= \all' -> pure [label | Started label <- all']
 
 -- | What an operator is doing.

@@ -15,7 +15,7 @@ import Data.List (group)
 import Test.Hspec hiding (after, before)
 
 import Behavior (Behavior, Seconds, sleep, (|||))
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, now, withSink)
+import Behavior.Internal.Runtime (Label (..), atomically, now)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Options (scheduled, slip), Schedule (Seeded), defaults, simulate, simulateWith)
 import Support
@@ -213,7 +213,7 @@ deciding = do
     events <- newLog
     threads <- newLog
     level <- newSensor $ \n -> (n > 5) <$ (myThreadId >>= note threads)
-    withSink (note events) (Signal.waitUntil (sensing level))
+    watchingThreads (note events) (Signal.waitUntil (sensing level))
     notes events
       `shouldReturn` [f (Label "waitUntil" "polling") | f <- [Started, Ended]]
     map length . group <$> notes threads `shouldReturn` [6]
@@ -271,7 +271,7 @@ recovering = do
           readings level `shouldReturn` earlier
           atomically (writeTVar low False)
         watch event = when (event == Ended (Label "monitor" "polling")) (open resting)
-    withSink watch (Signal.monitor (sensing level) recovery (pure "task"))
+    watchingThreads watch (Signal.monitor (sensing level) recovery (pure "task"))
       `shouldReturn` "task"
 
   it "what decides after the recovery is a reading that began after it" $ do

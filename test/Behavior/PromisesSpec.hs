@@ -13,7 +13,7 @@ import System.Mem (performMajorGC)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), atomically, awaitUninterruptibly, withSink)
+import Behavior.Internal.Runtime (atomically, awaitUninterruptibly)
 import Places
 import Support
 
@@ -167,7 +167,7 @@ branches = do
 
   inEach threaded "is labelled with its operator and its name, and is reported when it starts and ends" $ \place -> do
     (_, events) <- observing $ \entries ->
-      withSink (note entries) (placed place (pure ()))
+      watchingThreads (note entries) (placed place (pure ()))
     let started = [label | Started label <- events]
         ended = [label | Ended label <- events]
     [label | label <- started, Just label == placeLabel place] `shouldSatisfy` ((== 1) . length)

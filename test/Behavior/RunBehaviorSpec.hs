@@ -22,7 +22,7 @@ import System.Posix.Signals
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, awaitUninterruptibly, withSink)
+import Behavior.Internal.Runtime (Label (..), atomically, awaitUninterruptibly)
 import Support
 
 spec :: Spec
@@ -33,8 +33,8 @@ spec = guarded . describe "runBehavior" $ do
     (runBehavior (throwIO (Fault "bug")) :: IO ()) `shouldThrow` (== Fault "bug")
 
   it "runs it in an unbound thread, labelled, and unmasked" $ do
-    (end, events) <- observing $ \entries -> withSink (note entries) $
-      bound (mask_ (runBehavior ((,) <$> isCurrentThreadBound <*> getMaskingState)))
+    (end, events) <- observing $ \entries ->
+      bound (watchingThreads (note entries) (mask_ (runBehavior ((,) <$> isCurrentThreadBound <*> getMaskingState))))
     end `shouldBe` Gave (False, Unmasked)
     events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
 

@@ -20,6 +20,7 @@ import Test.Hspec hiding (parallel)
 import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
+import Behavior.Internal.Trace.Event (Cause (..))
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly)
 import Support
@@ -28,7 +29,7 @@ spec :: Spec
 spec = guarded $ do
   describe "start" starting
   describe "interrupt" interrupting
-  describe "withSink" reporting
+  describe "A thread" reporting
   describe "atomically" waiting
   describe "structured" scopes
   describe "StoppedWithFault" pairs
@@ -128,7 +129,7 @@ reporting = do
   it "reports the start and the end of each thread, in the thread itself, masked" $ do
     entries <- newLog
     let sink event = (,,) event <$> myThreadId <*> getMaskingState >>= note entries
-    thread <- withSink sink $ do
+    thread <- watchingThreads sink $ do
       thread <- mask_ (start label (pure ()))
       thread <$ atomically (threadEnd thread)
     events <- notes entries
@@ -137,15 +138,15 @@ reporting = do
     [state | (_, _, state) <- events] `shouldSatisfy` notElem Unmasked
 
   it "reports the end of a thread that throws" $ do
-    (_, events) <- observing $ \entries -> withSink (note entries) $ do
+    (_, events) <- observing $ \entries -> watchingThreads (note entries) $ do
       thread <- mask_ (start label (failed :: IO ()))
       atomically (threadEnd thread)
     events `shouldBe` [Started label, Ended label]
 
   it "reports nothing after the action has ended, in whatever way" $ do
     (end, events) <- observing $ \entries -> do
-      withSink (note entries) (pure ())
-      _ <- ending (withSink (note entries) failed)
+      watchingThreads (note entries) (pure ())
+      _ <- ending (watchingThreads (note entries) failed)
       thread <- mask_ (start label (pure ()))
       void (atomically (threadEnd thread))
     end `shouldBe` Gave ()
@@ -188,13 +189,13 @@ waiting = do
 scopes :: Spec
 scopes = do
   it "runs the verdict when nothing was started" $ do
-    structured (\_ -> pure (pure 'a')) `shouldReturn` 'a'
-    structured (\_ -> pure (failed :: IO ())) `shouldThrow` (== Failed)
-    structured (\_ -> failed :: IO (IO ())) `shouldThrow` (== Failed)
+    inScope (\_ -> pure (pure 'a')) `shouldReturn` 'a'
+    inScope (\_ -> pure (failed :: IO ())) `shouldThrow` (== Failed)
+    inScope (\_ -> failed :: IO (IO ())) `shouldThrow` (== Failed)
 
   it "runs the verdict when all branches have ended" $
     for_ [pure (), failed] $ \bodysEnd -> do
-      (_, done) <- observing $ \entries -> structured $ \scope -> do
+      (_, done) <- observing $ \entries -> inScope $ \scope -> do
         inside <- newGate
         _ <- branch scope label ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
         pass inside
@@ -202,7 +203,7 @@ scopes = do
       done `shouldBe` ["cleaned up", "verdict"]
 
   it "stops what was started when the body throws" $ do
-    (end, done) <- observing $ \entries -> structured $ \scope -> do
+    (end, done) <- observing $ \entries -> inScope $ \scope -> do
       inside <- newGate
       _ <- branch scope label ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
       pass inside
@@ -210,7 +211,7 @@ scopes = do
     (end, done) `shouldBe` (FaultedWith (show (Fault "body")), ["cleaned up"])
 
   it "lets a worker read whether its stop was requested" $ do
-    (_, values) <- observing $ \entries -> structured $ \scope -> do
+    (_, values) <- observing $ \entries -> inScope $ \scope -> do
       inside <- newGate
       mayEnd <- newGate
       started <- worker scope label $ \stopRequested -> do
@@ -218,40 +219,40 @@ scopes = do
         (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> stopRequested >>= note entries
         pass mayEnd
       pass inside
-      requestStopAsync [SomeBranch started]
+      requestStopAsync cause [SomeBranch started]
       open mayEnd
       pure <$> atomically (outcome started)
     values `shouldBe` [False, True]
 
   it "throws the stop request to a branch only once, however often it is made" $ do
-    (_, done) <- observing $ \entries -> structured $ \scope -> do
+    (_, done) <- observing $ \entries -> inScope $ \scope -> do
       inside <- newGate
       cleaning <- newGate
       mayEnd <- newGate
       started <- branch scope label $
         (open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note entries "cleaned up") :: IO (Branch ())
       pass inside
-      requestStopAsync [SomeBranch started]
-      requestStopAsync [SomeBranch started]
+      requestStopAsync cause [SomeBranch started]
+      requestStopAsync cause [SomeBranch started]
       pass cleaning
       open mayEnd
       pure (pure ())
     done `shouldBe` ["cleaned up"]
 
   it "requests the stops of uninterruptible branches without waiting" $ do
-    (end, done) <- observing $ \entries -> structured $ \scope -> do
+    (end, done) <- observing $ \entries -> inScope $ \scope -> do
       insides <- replicateM 3 newGate
       mayEnd <- newGate
       started <- traverse (\inside -> branch scope label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) insides
       traverse_ pass insides
-      requestStopAsync (map SomeBranch (started :: [Branch ()]))
+      requestStopAsync cause (map SomeBranch (started :: [Branch ()]))
       note entries "requested"
       open mayEnd
       pure (pure ())
     (end, done) `shouldBe` (Gave (), ["requested"])
 
   it "gives the outcome of each branch, and turns it back into a result or an exception" $
-    structured $ \scope -> do
+    inScope $ \scope -> do
       well <- branch scope label (pure 'a')
       badly <- branch scope label (failed :: IO Char)
       (outcomeToIO =<< awaitOutcome well) `shouldReturn` 'a'
@@ -264,7 +265,7 @@ scopes = do
     cleaning <- newGate
     mayEnd <- newGate
     (end, done) <- observing $ \entries -> do
-      let operator = structured $ \scope -> do
+      let operator = inScope $ \scope -> do
             _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
             pass inside
             pure (failed :: IO ())
@@ -289,7 +290,7 @@ scopes = do
     cleaning <- newGate
     mayEnd <- newGate
     (end, done) <- observing $ \entries -> do
-      let operator = structured $ \scope -> do
+      let operator = inScope $ \scope -> do
             inside <- newGate
             _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
             pass inside
@@ -304,7 +305,7 @@ scopes = do
   for_ [toException BlockedIndefinitelyOnMVar, toException BlockedIndefinitelyOnSTM] $ \deadlock ->
     it ("throws a branch's fault rather than " ++ show deadlock) $ do
       inside <- newGate
-      let operator = structured $ \scope -> do
+      let operator = inScope $ \scope -> do
             _ <- branch scope label ((open inside >> hang) `onException` throwIO (Fault "branch")) :: IO (Branch ())
             hang :: IO (IO ())
       withThread operator $ \caller -> do
@@ -318,6 +319,10 @@ scopes = do
         let due = Signal.polling 1 ((>= start') <$> now)
         run <- simulated (parallel (Signal.monitor ((&&) <$> due <*> due) (pure ()) hang) (sleep start'))
         finished run `shouldBe` start'
+ where
+  -- An operator with this verdict.
+  inScope body = structured "operator" (fmap (Verdict cause) . body)
+  cause = SiblingFinished "sibling"
 
 pairs :: Spec
 pairs = do

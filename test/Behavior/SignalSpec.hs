@@ -12,7 +12,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (ioProperty, (===))
 
 import Behavior (both, (?))
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, withSink)
+import Behavior.Internal.Runtime (Label (..), atomically)
 import qualified Behavior.Signal as Signal
 import Support
 import Watched
@@ -94,7 +94,7 @@ several = do
 started :: IO a -> IO [Label]
 started act = do
   events <- newLog
-  _ <- withSink (note events) act
+  _ <- watchingThreads (note events) act
   notes events >>= \all' -> pure [label | Started label <- all']
 
 sharing :: Spec

@@ -15,7 +15,7 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (Event (..), Label (..), withSink)
+import Behavior.Internal.Runtime (Label (..))
 import Behavior.Internal.Seconds (duration, period)
 import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, simulate)
 import Behavior.Time
@@ -177,7 +177,7 @@ timeouts = do
       begun <- now
       let timeIsUp = (>= begun + 0.02) <$> now
           startingLate event = when (event == Started (Label "timeout" "clock")) (eventually timeIsUp)
-      withSink startingLate (timeout 0.02 hang) `shouldThrow` (== TimedOut 0.02)
+      watchingThreads startingLate (timeout 0.02 hang) `shouldThrow` (== TimedOut 0.02)
       ended <- now
       -- (If the machine was too slow, the result means nothing: then try again.)
       pure (ended < begun + 0.04)
@@ -188,7 +188,7 @@ timeouts = do
     atomically (readTVar var) `shouldReturn` 'b'
 
   it "labels its two threads, the branch and the clock" $ do
-    (_, events) <- observing $ \entries -> withSink (note entries) (timeout 3600 (pure ()))
+    (_, events) <- observing $ \entries -> watchingThreads (note entries) (timeout 3600 (pure ()))
     [started | Started started <- events]
       `shouldMatchList` [Label "timeout" "branch", Label "timeout" "clock"]
 

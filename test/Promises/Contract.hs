@@ -24,13 +24,13 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (isNothing)
 
 import Behavior (Behavior, BehaviorFailed, failWith)
-import Behavior.Internal.Runtime (Event (..), Label (..), atomically, liveThreadCount, withSink)
+import Behavior.Internal.Runtime (Label (..), atomically, liveThreadCount)
 import Behavior.Signal (Signal, watching)
 import Promises.Language (Language)
 import qualified Promises.Language as L
 import Promises.Stage hiding (ending)
 import Promises.Tree
-import Support (Ending (..), endingOf, hang)
+import Support (Ending (..), ThreadEvent (..), endingOf, hang, watchingThreads)
 
 -- | The clauses of the contract.
 data Clause = Structure | Exclusion | Work | FaultOut | Masking | Outcomes | Labels
@@ -60,7 +60,7 @@ satisfies clause stage' language' (Program tree stimuli state) = do
           -- waits for ever.
           _ -> if any (stopsCaller . snd) stimuli then hang else either throwIO pure end
       whole = calling stage' (atomically . writeTVar (input context)) stimuli caller
-  end <- (if clause == Labels then withSink (labelling context) else id) (run stage' whole)
+  end <- run stage' (if clause == Labels then watchingThreads (labelling context) whole else whole)
   case end of
     Gave outcome
       | cancelledBy outcome, not (any (stopsCaller . snd) stimuli) -> broken ("an outcome of a cancellation that was not sent: " ++ show outcome)

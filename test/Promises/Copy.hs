@@ -223,7 +223,7 @@ pollingWith flaw every act = Signal $ \_ -> do
   nextSlot <- newTVarIO Nothing
   started <- newTVarIO (0 :: Int)
   newest <- newTVarIO Nothing
-  let readings stopRequested = forever $ do
+  let readRepeatedly stopRequested = forever $ do
         atomically (readTVar nextSlot) >>= traverse_ sleepUntil
         begun <- now
         k <- atomically $ do
@@ -237,7 +237,7 @@ pollingWith flaw every act = Signal $ \_ -> do
           else atomically (writeTVar newest (Just (k, read')))
       prepareReadings = do
         unless (flaw /= Just ForgetsThePeriod) (writeTVar nextSlot Nothing)
-        pure (\stopRequested -> readings stopRequested `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
+        pure (\stopRequested -> readRepeatedly stopRequested `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
       seen = do
         before <- readTVar started
         pure . constantView $

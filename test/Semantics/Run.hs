@@ -5,6 +5,11 @@
 module Semantics.Run
   ( observed
   , allObserved
+
+    -- * Runs of which more is observed
+  , Instrument (..)
+  , observedWith
+  , operatorName
   ) where
 
 import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, retry, throwSTM, writeTVar)
@@ -25,9 +30,10 @@ import Control.Exception
 import Control.Monad (void)
 import Data.Foldable (for_)
 import Data.IORef
+import Data.List (isPrefixOf)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
-import Data.Maybe (catMaybes, isJust, isNothing)
+import Data.Maybe (catMaybes, fromMaybe, isJust, isNothing)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
@@ -36,7 +42,7 @@ import Behavior.Internal.Nursery
 import Behavior.Internal.Parallel (allOf, both, decide, firstOf, parallel)
 import Behavior.Internal.Reactive.Operators
 import Behavior.Internal.Reactive.Timeout
-import Behavior.Internal.Runtime hiding (Event (..), Label)
+import Behavior.Internal.Runtime hiding (Label)
 import Behavior.Internal.Signal.Filter (debounce, hysteresis, throttle)
 import Behavior.Internal.Signal.Polling
 import Behavior.Internal.Signal.Shared (withShared)
@@ -64,7 +70,59 @@ import Semantics.Program hiding (Label)
 -- | Simulates the world's program under a schedule, and returns what was observed, or the
 -- reason why the run had no proper end.
 observed :: Schedule -> World -> IO (Either String Seen)
-observed how world = observing (simulateWith (limits world) {scheduled = how}) world
+observed how world = fst <$> observedWith plain how world
+
+-- | Likewise, with an instrument; gives the whole run, too.
+observedWith :: Instrument position -> Schedule -> World -> IO (Either String Seen, Run Value)
+observedWith instrument how world = observing instrument (simulateWith (limits world) {scheduled = how}) world
+
+-- | What is done around the parts of a program, each of which has a position in it.
+data Instrument position = Instrument
+  { root :: position
+  , inBranch :: String -> position -> position
+  -- ^ The position in the branch with this label, of the operator with that position.
+  , aroundAll :: Behavior Value -> Behavior Value
+  , aroundPart :: position -> Program -> (position -> position -> Behavior Value) -> Behavior Value
+  -- ^ What runs is a function of its position, and of that within it, if it is an operator.
+  , aroundCleanup :: position -> Behavior () -> Behavior ()
+  , whenSet :: Condition -> Level -> IO ()
+  -- ^ When a condition has changed.
+  , ofSignal :: Maybe Condition -> Library.Signal Int -> Library.Signal Int
+  -- ^ For the whole signal of an operator (but of withShared), and for each condition.
+  }
+
+-- | Nothing is done around anything.
+plain :: Instrument ()
+plain =
+  Instrument
+    { root = ()
+    , inBranch = \_ _ -> ()
+    , aroundAll = id
+    , aroundPart = \_ _ run -> run () ()
+    , aroundCleanup = const id
+    , whenSet = \_ _ -> pure ()
+    , ofSignal = const id
+    }
+
+-- | The operator at the top of a program, if there is one.
+operatorName :: Program -> Maybe String
+operatorName = \case
+  Parallel _ _ -> Just "parallel"
+  Both _ _ -> Just "both"
+  FirstOf _ -> Just "firstOf"
+  AllOf _ -> Just "allOf"
+  Decide {} -> Just "decide"
+  RSelect {} -> Just "rSelect"
+  Monitor {} -> Just "monitor"
+  InsteadWhen {} -> Just "insteadWhen"
+  Switch _ _ -> Just "switch"
+  TeleoReactive _ -> Just "teleoReactive"
+  WaitUntil _ -> Just "waitUntil"
+  WhileHolding _ _ -> Just "whileHolding"
+  Timeout _ _ -> Just "timeout"
+  WithShared _ _ -> Just "withShared"
+  Scoped _ -> Just "scoped"
+  _ -> Nothing
 
 -- | Simulates the world's program under all schedules with up to the given number of
 -- pre-emptions, but under no more schedules than the second number. Returns all that was
@@ -73,7 +131,7 @@ allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
   report <- explore (exhaustively preemptions) {search = Exhaustive preemptions most, runOptions = limits world} $ \simulated ->
-    observing simulated world >>= \seen -> modifyIORef' found (Set.insert seen)
+    observing plain simulated world >>= \(seen, _) -> modifyIORef' found (Set.insert seen)
   found' <- readIORef found
   pure (found', complete report)
 
@@ -81,17 +139,17 @@ allObserved preemptions most world = do
 limits :: World -> Options
 limits world = defaults {livelockLimit = 20000, endAt = 60, slip = fromIntegral (slippage world)}
 
-observing :: (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Seen)
-observing simulated world = do
+observing :: Instrument position -> (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Seen, Run Value)
+observing instrument simulated world = do
   emittedRef <- newIORef []
   -- The steps of the run have the times of the transitions.
   let emit transition = modifyIORef' emittedRef (transition :) >> annotate (show transition)
-  run <- simulated (behavior emit world)
+  run <- simulated (aroundAll instrument (behavior instrument emit world))
   emitted <- reverse <$> readIORef emittedRef
   let record = recorded (Sim.steps run) emitted
       seen e = Right Seen {timeline = record, end = e}
       returnedWith = seen . Gave (ticks (finished run))
-  evaluated $ case outcome run of
+  fmap (\it -> (it, run)) . evaluated $ case outcome run of
     Sim.Returned value -> returnedWith (Succeeded value)
     Sim.Failing e -> returnedWith (thrown e)
     Sim.Faulting e -> returnedWith (thrown e)
@@ -108,7 +166,7 @@ observing simulated world = do
   evaluated whole = whole <$ evaluate (whole == whole)
   ticks = round
   recorded (s : others) transitions = case (did s, transitions) of
-    (Note _, transition : later) -> (ticks (at s), transition) : recorded others later
+    (Note text, transition : later) | text == show transition -> (ticks (at s), transition) : recorded others later
     -- The relation has the ends of branches only.
     (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others transitions
     _ -> recorded others transitions
@@ -117,23 +175,24 @@ observing simulated world = do
 
 -- | The state that a program runs with: the conditions, the number of calls of each action,
 -- how to fork into the innermost scope, and the innermost shared signal.
-data Stage = Stage
+data Stage position = Stage
   { levels :: Map Condition (TVar Level)
   , calls :: IORef (Map Name Int)
-  , forking :: Behavior Value -> Behavior (Child Value)
+  , forking :: (position -> Behavior Value) -> Behavior (Child Value)
   , nearest :: Library.Signal Int
   }
 
 -- | The world's program and environment. The given action receives each transition; it must
 -- not be a scheduling point.
-behavior :: (Transition -> IO ()) -> World -> Behavior Value
-behavior emit world = do
+behavior :: Instrument position -> (Transition -> IO ()) -> World -> Behavior Value
+behavior instrument emit world = do
   stage <- Stage <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure noNursery <*> pure (pure 0)
-  let running = toBehavior emit stage (program world)
+  let running at' = toBehavior instrument emit stage at' (program world)
   case caller world of
-    Operator -> firstOf [running, timeIsUp <$ environment stage]
+    Operator -> aroundPart instrument (root instrument) (FirstOf [program world]) $ \_ within ->
+      firstOf [running (inBranch instrument "firstOf: 1" within), timeIsUp <$ environment stage]
     PlainThread type' later -> do
-      thread <- mask_ (start (Sim.Label "plain thread" "") running)
+      thread <- mask_ (start (Sim.Label "plain thread" "") (running (inBranch instrument "plain thread" (root instrument))))
       let interrupting = case type' of
             Asynchronous -> throwToAll (const Enough) [threadId thread]
             Synchronous -> throwToAll (const EnoughOfThis) [threadId thread]
@@ -146,52 +205,59 @@ behavior emit world = do
   environment stage = do
     for_ (changes world) $ \(Change when condition level) -> do
       sleepUntil (fromIntegral when)
-      for_ (Map.lookup condition (levels stage)) $ \var -> atomically (writeTVar var level)
+      for_ (Map.lookup condition (levels stage)) $ \var -> atomically (writeTVar var level) >> whenSet instrument condition level
       emit (condition `Becomes` level)
     sleepUntil (fromIntegral (cancelAt world))
   noNursery _ = throwIO (ErrorCall "a fork outside every scope")
 
-toBehavior :: (Transition -> IO ()) -> Stage -> Program -> Behavior Value
-toBehavior emit stage = go
+toBehavior :: Instrument position -> (Transition -> IO ()) -> Stage position -> position -> Program -> Behavior Value
+toBehavior instrument emit stage = go
  where
-  go :: Program -> Behavior Value
-  go = \case
+  -- A part, and how it runs at its position; an operator's parts have the position within it.
+  go here p = aroundPart instrument here p (part p)
+  part p outer within = case p of
     Do name scripts -> do
       checkpoint
       n <- atomicModifyIORef' (calls stage) $ \counts ->
         let n = Map.findWithDefault 0 name counts in (Map.insert name (n + 1) counts, n)
-      act (emit . Action name) name (scripts !! min n (length scripts - 1))
+      act (emit . Action name) (aroundCleanup instrument outer) name (scripts !! min n (length scripts - 1))
     Pure value -> pure value
-    Then first second -> go first >> go second
-    Else first second -> go first ? go second
-    Attempt n p -> attempt n (go p)
-    FallbackOver ps -> fallbackOver ps go
-    Parallel left right -> Unit <$ parallel (go left) (go right)
-    Both left right -> Unit <$ both (go left) (go right)
-    FirstOf ps -> firstOf (map go ps)
-    AllOf ps -> Several <$> allOf (map go ps)
-    Decide choice ps q -> decide (chosenFrom choice (go q)) (map go ps)
-    RSelect signal left right -> rSelect (holds <$> level signal) (go left) (go right)
-    Monitor signal recovery task -> monitor (holds <$> level signal) (void (go recovery)) (go task)
-    InsteadWhen signal emergency p -> insteadWhen (holds <$> level signal) (go emergency) (go p)
-    Switch signal branches -> switch (level signal) (\n -> go (branches !! max 0 (min n (length branches - 1))))
-    TeleoReactive rules -> teleoReactive [(holds <$> level signal, go p) | (signal, p) <- rules]
+    Then first second -> go outer first >> go outer second
+    Else first second -> go outer first ? go outer second
+    Attempt n q -> attempt n (go outer q)
+    FallbackOver ps -> fallbackOver ps (go outer)
+    Parallel left right -> Unit <$ parallel (branch "left" left) (branch "right" right)
+    Both left right -> Unit <$ both (branch "left" left) (branch "right" right)
+    FirstOf ps -> firstOf (numbered ps)
+    AllOf ps -> Several <$> allOf (numbered ps)
+    Decide choice ps q -> decide (chosenFrom choice (go outer q)) (numbered ps)
+    RSelect signal left right -> rSelect (holds <$> level signal) (branch "left" left) (branch "right" right)
+    Monitor signal recovery task -> monitor (holds <$> level signal) (void (branch "recovery" recovery)) (branch "task" task)
+    InsteadWhen signal emergency q -> insteadWhen (holds <$> level signal) (branch "emergency" emergency) (branch "branch" q)
+    Switch signal branches -> switch (level signal) (\n -> branch "branch" (branches !! max 0 (min n (length branches - 1))))
+    TeleoReactive rules -> teleoReactive [(holds <$> level signal, branch ("rule " ++ show n) q) | (n, (signal, q)) <- zip [1 :: Int ..] rules]
     WaitUntil signal -> Unit <$ waitUntil (holds <$> level signal)
-    WhileHolding signal p -> whileHolding (holds <$> level signal) (go p)
-    Timeout limit p -> timeout (fromIntegral limit) (go p)
-    WithShared signal p -> withShared (level signal) (\s -> toBehavior emit stage {nearest = s} p)
-    Scoped body -> scoped (\nursery -> toBehavior emit stage {forking = fork nursery} body)
-    Fork p -> Unit <$ forking stage (go p)
-    Await p q -> forking stage (go p) >>= \child -> go q >> atomically (await child)
-    StopChild p q -> forking stage (go p) >>= \child -> go q >> requestStop child >> atomically (await child)
-  level = \case
-    Watched condition -> watching (reading condition)
-    Polled every p -> number <$> polling (fromIntegral every) (go p)
-    And a b -> (\m n -> fromEnum (holds m && holds n)) <$> level a <*> level b
-    Hysteresis initially low high signal -> fromEnum <$> hysteresis initially low high (level signal)
-    Debounce n signal -> debounce (fromIntegral n) (level signal)
-    Throttle n signal -> throttle (fromIntegral n) (level signal)
-    StaleAfter n signal -> staleAfter (fromIntegral n) (level signal)
+    WhileHolding signal q -> whileHolding (holds <$> level signal) (branch "branch" q)
+    Timeout limit q -> timeout (fromIntegral limit) (branch "branch" q)
+    WithShared signal q -> withShared (levelIn (labelled "polling") signal) (\s -> toBehavior instrument emit stage {nearest = s} (labelled "body") q)
+    Scoped body -> scoped $ \nursery ->
+      toBehavior instrument emit stage {forking = \child -> fork nursery (child (labelled "fork"))} (labelled "body") body
+    Fork q -> Unit <$ forking stage (`go` q)
+    Await q r -> forking stage (`go` q) >>= \child -> go outer r >> atomically (await child)
+    StopChild q r -> forking stage (`go` q) >>= \child -> go outer r >> requestStop child >> atomically (await child)
+   where
+    labelled name = inBranch instrument (fromMaybe "" (operatorName p) ++ ": " ++ name) within
+    branch name = go (labelled name)
+    numbered ps = [branch (show n) q | (n, q) <- zip [1 :: Int ..] ps]
+    level signal = ofSignal instrument Nothing (levelIn (labelled "polling") signal)
+  levelIn sensor = \case
+    Watched condition -> ofSignal instrument (Just condition) (watching (reading condition))
+    Polled every p -> number <$> polling (fromIntegral every) (go sensor p)
+    And a b -> (\m n -> fromEnum (holds m && holds n)) <$> levelIn sensor a <*> levelIn sensor b
+    Hysteresis initially low high signal -> fromEnum <$> hysteresis initially low high (levelIn sensor signal)
+    Debounce n signal -> debounce (fromIntegral n) (levelIn sensor signal)
+    Throttle n signal -> throttle (fromIntegral n) (levelIn sensor signal)
+    StaleAfter n signal -> staleAfter (fromIntegral n) (levelIn sensor signal)
     Shared -> nearest stage
   reading :: Condition -> STM Int
   reading condition = case Map.lookup condition (levels stage) of
@@ -215,8 +281,8 @@ chosenFrom choice chosen ends' = case choice of
   succeeded = length [() | Just (Right _) <- ends']
 
 -- | One call of an action.
-act :: (ActionEvent -> IO ()) -> Name -> Script -> Behavior Value
-act emit name script = do
+act :: (ActionEvent -> IO ()) -> (Behavior () -> Behavior ()) -> Name -> Script -> Behavior Value
+act emit cleaning name script = do
   emit Begins
   mask $ \restore ->
     try (inState restore (wait (takes script))) >>= \case
@@ -228,7 +294,7 @@ act emit name script = do
             case onStop script of
               StopsAtOnce -> throwIO e
               StopsAfter n -> clean n >> emit Stops >> throwIO e
-              CleansUpInterruptibly n -> (wait n `onException` emit ReceivesStop) >> emit Stops >> throwIO e
+              CleansUpInterruptibly n -> (cleaning (wait n) `onException` emit ReceivesStop) >> emit Stops >> throwIO e
               EndsAfter n how -> clean n >> finish (cleanupOf name) how
  where
   inState restore = case masking script of
@@ -242,7 +308,7 @@ act emit name script = do
       Succeeds n -> pure (Number n)
       Fails -> throwIO (Failure name')
       Faults -> throwIO (Fault name')
-  clean n = uninterruptibleMask_ (wait n)
+  clean n = uninterruptibleMask_ (cleaning (wait n))
   -- Zero ticks are a scheduling point, too: other threads can interrupt this one there, or
   -- run before it.
   wait n = if n > 0 then sleep (fromIntegral n) else checkpoint
@@ -252,8 +318,12 @@ thrown :: SomeException -> Result
 thrown e
   | Just (StoppedWithFault _ fault) <- fromException e = Stopped (Just (show fault))
   | isStopRequest e = Stopped Nothing
-  | isFailure e = Failed (show e)
+  | Just (BehaviorFailed _ failure) <- fromException e = Failed (withoutNames (show failure))
   | otherwise = Faulted (show e)
+
+-- | The text of a failure; the relation does not name the signals of a condition.
+withoutNames :: String -> String
+withoutNames text = if (init doesNotHold ++ ": ") `isPrefixOf` text then doesNotHold else text
 
 newtype Failure = Failure Name
 

@@ -19,10 +19,12 @@ import qualified SharedFilters
 import qualified SimGhc
 import qualified SimReality
 import qualified StuckMasked
+import qualified Sinks
 import qualified SlowStops
 import qualified StopsOnce
 import qualified Storm
 import qualified StuckLimits
+import qualified Traces
 import qualified UndefinedOutside
 import qualified UninterruptibleCaller
 
@@ -50,10 +52,12 @@ attacks =
   , ("SimGhc", SimGhc.attack)
   , ("SimReality", SimReality.attack)
   , ("StuckMasked", StuckMasked.attack)
+  , ("Sinks", Sinks.attack)
   , ("SlowStops", SlowStops.attack)
   , ("StopsOnce", StopsOnce.attack)
   , ("Storm", Storm.attack)
   , ("StuckLimits", StuckLimits.attack)
+  , ("Traces", Traces.attack)
   , ("UndefinedOutside", UndefinedOutside.attack)
   ]
 

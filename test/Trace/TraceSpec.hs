@@ -1,0 +1,233 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- Traces on real threads: names, parents, causes, and paths of failures.
+module Trace.TraceSpec (spec) where
+
+import Control.Concurrent (forkIO)
+import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
+import Control.Exception
+import Control.Monad (void)
+import Data.Foldable (for_)
+import Data.IORef (modifyIORef', newIORef, readIORef)
+import Data.List (isPrefixOf)
+import Data.Maybe (fromMaybe, listToMaybe)
+import Test.Hspec
+
+import Behavior
+import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.Parallel (allOf, await, firstOf, fork, requestStop, scoped, tryAwait)
+import qualified Behavior.Signal as Signal
+import Behavior.Time (abandoning, atomically, cleanupWithin, timeout)
+import Behavior.Trace
+import Memory (inConstantMemory)
+import Places
+import Support hiding (End, Ending (..), Failure, ThreadEvent (..), notes, within)
+import qualified Support
+import Trace.Traced
+
+spec :: Spec
+spec = guarded $ do
+  describe "named" naming
+  describe "The parent of a span" parents
+  describe "A span that was stopped says why:" causes
+  describe "A reaction" reactions
+  describe "withTrace" tracing
+
+naming :: Spec
+naming = do
+  for_ [("without a trace", False), ("in a trace", True)] $ \(where', isOn) -> describe where' $ do
+    let traced :: Behavior a -> Behavior a
+        traced act = if isOn then withTrace [] act else act
+    it "gives the result, and throws what the behaviour throws" $ do
+      traced (named "n" (pure 'a')) `shouldReturn` 'a'
+      ending (traced (named "n" (throwIO (Fault "bug") :: IO Char))) `shouldReturn` Support.FaultedWith (show (Fault "bug"))
+      traced (named "n" (failWith "locked" :: IO ())) `shouldThrow` (== FailedBecause "locked")
+      traced (named "n" (throwIO (Cancel "caller") :: IO ())) `shouldThrow` (== Cancel "caller")
+
+    it "keeps the caller's masking state" $
+      for_ [(id, Unmasked), (mask_, MaskedInterruptible), (uninterruptibleMask_, MaskedUninterruptible)] $ \(inState, state) ->
+        inState (traced (named "n" (named "m" getMaskingState))) `shouldReturn` state
+
+  it "is a tail call without a trace: a million, one in the other, in constant memory" $
+    inConstantMemory 1000000 $ \step ->
+      let loop n = named "n" (step >> if n > (1000000 :: Int) then pure () else loop (n + 1)) in loop 0
+
+  it "takes constant memory in a trace, if what is in a loop has the name" $
+    inConstantMemory 100000 $ \step -> withTrace [] . for_ [0 .. 100000 :: Int] . const $ named "n" step
+
+  it "adds the path to a failure, once, which is caught as before" $ do
+    let locked = named "mission" (named "enter room" (named "front door" (failWith "locked")))
+    (_, seen) <- (,) () <$> try (withTrace [] locked)
+    either failurePath (\() -> []) seen `shouldBe` ["mission", "enter room", "front door"]
+    either displayException (\() -> "") (seen :: Either BehaviorFailed ())
+      `shouldBe` "mission > enter room > front door: the behaviour failed: locked"
+    either show (\() -> "") seen `shouldBe` "mission > enter room > front door: FailedBecause \"locked\""
+    withTrace [] locked `shouldThrow` (== FailedBecause "locked")
+    withTrace [] (locked ? pure ()) `shouldReturn` ()
+    plain <- try locked
+    either failurePath (\() -> ["none"]) plain `shouldBe` []
+
+  it "adds the path also to what a branch, or a time limit, fails with" $ do
+    seen <- try (withTrace [] (named "a" (both hang (named "b" failed))))
+    either failurePath (\() -> []) seen `shouldBe` ["a", "b"]
+    limited <- try (withTrace [] (named "a" (timeout 0.001 (named "b" hang))))
+    either failurePath (\() -> []) limited `shouldBe` ["a"]
+
+parents :: Spec
+parents = do
+  for_ places $ \place ->
+    it ("is right in " ++ placeName place) $ do
+      (_, seen) <- traceOf (named "outer" (placed place (named "inner" (pure ()))))
+      parentsOf seen `shouldContain` [("inner", Just (if placeName place `elem` ownName then "name" else "outer"))]
+      checkSpans seen
+
+  it "is right in a sensor's reading, in a cleanup, and in what a failure leads to" $ do
+    readings <- newTVarIO (0 :: Int)
+    let reading = named "read" (atomically (readTVar readings >>= \n -> n <$ writeTVar readings (n + 1)))
+    (_, seen) <- traceOf . named "outer" $ do
+      Signal.waitUntil ((> 2) <$> Signal.polling 0.001 reading)
+      begun <- newGate
+      named "task" (Support.open begun >> hang) `finally` named "cleanup" (pure ()) ||| pass begun
+      named "try" failed ? named "recover" (pure ())
+      timeout 0.001 (hang `onException` cleanupWithin 1 (named "park" (pure ()))) ? pure ()
+    for_ ["read", "task", "cleanup", "try", "recover", "park"] $ \name -> parentsOf seen `shouldContain` [(name, Just "outer")]
+    checkSpans seen
+
+  it "is that of the scope, for what is forked" $ do
+    (_, seen) <- traceOf . named "outer" . scoped $ \nursery -> do
+      child <- named "starts" (fork nursery (named "child" (pure ())))
+      atomically (await child)
+    parentsOf seen `shouldContain` [("child", Just "outer")]
+
+  it "is right in operators within operators" $ do
+    let nest = foldr (\n inner -> named ("level " ++ show n) (inner ||| hang)) (pure ()) [1 .. 10 :: Int]
+    (_, seen) <- traceOf nest
+    parentsOf seen `shouldBe` [("level " ++ show n, if n == 1 then Nothing else Just ("level " ++ show (n - 1))) | n <- [1 .. 10 :: Int]]
+    checkSpans seen
+
+  it "is unknown in a thread that this library does not start, unless it is adopted" $ do
+    done <- newGate
+    adopted <- newGate
+    (_, seen) <- traceOf . named "outer" $ do
+      _ <- forkIO (named "stray" (named "inside" (pure ())) >> Support.open done)
+      pass done
+      here <- adopt
+      _ <- forkIO (here (named "adopted" (pure ())) >> Support.open adopted)
+      pass adopted
+    [spanParent s | Began s <- seen, spanName s == "stray"] `shouldBe` [UnknownParent]
+    parentsOf seen `shouldContain` [("inside", Just "stray")]
+    parentsOf seen `shouldContain` [("adopted", Just "outer")]
+
+  it "is in the trace around it, of two that are made at the same time" $ do
+    inOne <- newGate
+    inOther <- newGate
+    let half mine theirs name = snd <$> traceOf (named name (Support.open mine >> pass theirs >> named (name ++ "'s") (pure ())))
+    seen <- allOf [half inOne inOther "one", half inOther inOne "other"]
+    map parentsOf seen `shouldBe` [[("one", Nothing), ("one's", Just "one")], [("other", Nothing), ("other's", Just "other")]]
+
+  it "is in both traces, of a trace inside another" $ do
+    inner <- newIORef []
+    (_, outerSeen) <- traceOf . named "outer" $ do
+      (_, seen) <- traceOf (named "inner" (both (named "deep" (pure ())) (pure ())))
+      modifyIORef' inner (const seen)
+    innerSeen <- readIORef inner
+    parentsOf outerSeen `shouldBe` [("outer", Nothing), ("inner", Just "outer"), ("deep", Just "inner")]
+    parentsOf innerSeen `shouldBe` [("inner", Nothing), ("deep", Just "inner")]
+    checkSpans outerSeen
+    checkSpans innerSeen
+ where
+  ownName = ["named", "named, in a trace"]
+
+causes :: Spec
+causes = do
+  cause "the left sibling finished" (\begun stoppable -> pass begun ||| stoppable) (SiblingFinished "left")
+  cause "the right sibling failed" (\begun stoppable -> both stoppable (pass begun >> failed) ? pure ()) (SiblingFailed "right")
+  cause "the third sibling finished" (\begun stoppable -> firstOf [stoppable, hang, pass begun]) (SiblingFinished "3")
+  cause "the second sibling failed" (\begun stoppable -> void (allOf [stoppable, pass begun >> failed]) ? pure ()) (SiblingFailed "2")
+  cause "a time limit" (\_ stoppable -> timeout 0.1 stoppable ? pure ()) (TimeLimit 0.1)
+  cause "what is forked ends with its scope" (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >> pass begun)) (SiblingFinished "body")
+  cause "requestStop" (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >>= \c -> pass begun >> requestStop c >> untilStopped c)) (FromOutside "requestStop")
+  cause "a cancellation from outside, also deep inside" (\begun stoppable -> cancelledFrom begun (both hang (firstOf [stoppable]))) (FromOutside (show (Cancel "user")))
+  cause "the outermost reason, for what is nested" (\_ stoppable -> timeout 0.1 (both hang (firstOf [stoppable])) ? pure ()) (TimeLimit 0.1)
+
+  it "a signal changed: with the values that the operator read" $ do
+    level <- newTVarIO (100 :: Int)
+    let battery = Signal.named "battery" (Signal.watching (readTVar level))
+        low = Signal.named "battery low" ((< 10) <$> battery)
+    (_, seen) <- traceOf $ Signal.insteadWhen low (pure ()) (named "drive" (atomically (writeTVar level 9) >> hang))
+    [c | Ended s _ (StoppedBy c) <- seen, spanName s == "drive"]
+      `shouldBe` [SignalChanged (reactionIn seen) [Change "battery" (Just "100") "9", Change "battery low" (Just "False") "True"]]
+
+  it "it was abandoned, and what begins in it later has no parent" $ do
+    mayEnd <- newGate
+    over <- newGate
+    living <- liveThreadCount
+    (_, seen) <- traceOf . named "outer" $ do
+      timeout 0.001 (abandoning 0.001 (uninterruptibleMask_ (named "stuck" (named "deep" (pass mayEnd)) >> named "later" (pure ()) >> Support.open over)))
+        ? pure ()
+      Support.open mayEnd
+      pass over
+    [(spanName s, c) | Ended s _ (StoppedBy c) <- seen] `shouldBe` [("deep", WasAbandoned), ("stuck", WasAbandoned)]
+    [spanParent s | Began s <- seen, spanName s == "later"] `shouldBe` [UnknownParent]
+    checkSpans seen
+    eventually ((== living) <$> liveThreadCount)
+ where
+  cause what act expected =
+    it what $ do
+      begun <- newGate
+      (_, seen) <- traceOf (act begun (named "stoppable" (Support.open begun >> hang)))
+      [c | Ended s _ (StoppedBy c) <- seen, spanName s == "stoppable"] `shouldBe` [expected]
+  untilStopped child = atomically (void (tryAwait child >>= maybe retry pure))
+  cancelledFrom begun act = try (cancellingSelf (pass begun) act) >>= either (\(Cancel _) -> pure ()) pure
+
+reactions :: Spec
+reactions = do
+  it "says what was stopped, after how long, and what it started" $ do
+    level <- newTVarIO (100 :: Int)
+    let low = Signal.named "low" ((< 10) <$> Signal.watching (readTVar level))
+        recharge = named "recharge" (atomically (writeTVar level 100))
+        drive = named "drive" (atomically (readTVar level >>= \n -> n <$ writeTVar level 5) >>= \n -> if n == 100 then hang else pure ())
+    once <- newTVarIO False
+    let task = readTVarIO once >>= \again -> if again then pure () else atomically (writeTVar once True) >> drive
+    (_, seen) <- traceOf (named "mission" (Signal.monitor low recharge task))
+    let found = [r | Reacted r <- seen]
+    [(reactionOperator r, reactionChanges r, stoppedName <$> reactionStopped r, reactionStarts r) | r <- found]
+      `shouldBe` [ ("monitor", [Change "low" (Just "False") "True"], Just "task", Just "recovery")
+                 , ("monitor", [Change "low" (Just "True") "False"], Nothing, Just "task")
+                 ]
+    [spanReaction s | Began s <- seen, spanName s == "recharge"] `shouldBe` map (Just . reactionNumber) (take 1 found)
+    [reactionParent r | r <- found] `shouldBe` [Inside n | _ <- found, Began s <- seen, spanName s == "mission", let n = spanNumber s]
+
+  it "is not reported when an operator only begins" $ do
+    (_, seen) <- traceOf (Signal.monitor (pure False) (pure ()) (pure ()) >> Signal.rSelect (pure True) (pure ()) (pure ()))
+    [() | Reacted _ <- seen] `shouldBe` []
+
+  it "gives a condition without a name a name" $ do
+    level <- newTVarIO False
+    (_, seen) <- traceOf (Signal.insteadWhen (Signal.watching (readTVar level)) (pure ()) (atomically (writeTVar level True) >> hang))
+    [reactionChanges r | Reacted r <- seen] `shouldBe` [[Change "condition" (Just "False") "True"]]
+
+tracing :: Spec
+tracing = do
+  it "has no operators and branches, unless they are asked for" $ do
+    let act = named "n" (both (pure ()) (pure ()))
+    (_, seen) <- traceOf act
+    [spanName s | Began s <- seen] `shouldBe` ["n"]
+    (_, detailed) <- tracedWith defaultTraceOptions {withOperators = True} act
+    take 2 [spanName s | Began s <- detailed] `shouldBe` ["n", "both"]
+    drop 2 [spanName s | Began s <- detailed] `shouldMatchList` ["both: left", "both: right"]
+    checkSpans detailed
+
+  it "numbers spans from 1" $ do
+    (_, seen) <- traceOf (named "a" (pure ()) >> named "b" (pure ()))
+    [spanNumber s | Began s <- seen] `shouldBe` [1, 2]
+
+  it "refuses a time that is negative or NaN, and runs nothing" $
+    for_ [-1, 0 / 0] $ \wrong ->
+      withTraceOptions defaultTraceOptions {waitAtEnd = wrong} [] (throwIO (Fault "ran") :: IO ())
+        `shouldThrow` \(ErrorCall text) -> "withTrace: waitAtEnd: " `isPrefixOf` text
+
+-- | The number of the first reaction.
+reactionIn :: [Event] -> Int
+reactionIn seen = fromMaybe 0 (listToMaybe [reactionNumber r | Reacted r <- seen])

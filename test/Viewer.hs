@@ -1,0 +1,32 @@
+module Main (main) where
+
+import Test.Hspec
+
+import qualified Viewer.DiffSpec
+import qualified Viewer.FileSpec
+import qualified Viewer.FormatSpec
+import qualified Viewer.InterruptionSpec
+import qualified Viewer.PlainLinesSpec
+import qualified Viewer.SummarySpec
+import qualified Viewer.SvgSpec
+import qualified Viewer.TerminalSpec
+import qualified Viewer.TextSpec
+import qualified Viewer.ToolSpec
+import qualified Viewer.TraceEventsSpec
+import qualified Viewer.TreeSpec
+
+main :: IO ()
+main = hspec $ do
+  describe "The file of a trace" $ do
+    Viewer.FileSpec.spec
+    Viewer.FormatSpec.spec
+  describe "An event as a line of text" Viewer.PlainLinesSpec.spec
+  describe "The tree" Viewer.TreeSpec.spec
+  describe "The tree in the terminal" Viewer.TerminalSpec.spec
+  describe "The timeline" Viewer.SvgSpec.spec
+  describe "An interruption" Viewer.InterruptionSpec.spec
+  describe "The summary" Viewer.SummarySpec.spec
+  describe "The differences" Viewer.DiffSpec.spec
+  describe "The trace-event format" Viewer.TraceEventsSpec.spec
+  describe "Texts of others" Viewer.TextSpec.spec
+  describe "behavior-trace" Viewer.ToolSpec.spec

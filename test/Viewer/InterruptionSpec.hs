@@ -1,0 +1,132 @@
+module Viewer.InterruptionSpec (spec) where
+
+import Data.List (foldl', isInfixOf)
+import qualified Data.Text.Lazy as Text
+import Test.Hspec
+
+import Behavior.Trace
+import Behavior.Trace.Recording
+import Behavior.Trace.Svg
+import Behavior.Trace.Terminal
+import Behavior.Trace.Tree
+import Viewer.Xml
+
+spec :: Spec
+spec = do
+  it "is described with the names of the spans" $
+    inTree patrol `shouldBe` ["battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
+  it "is described in the same words in the terminal" $
+    inTerminal patrol `shouldBe` ["battery 9.4 -> batteryLow True", "stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
+  it "is described in the same words in the timeline" $
+    inTimeline patrol `shouldBe` ["battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
+  it "is described in the same words where operators and branches are shown too" $ do
+    inTree detailedPatrol `shouldBe` inTree patrol
+    inTerminal detailedPatrol `shouldBe` inTerminal patrol
+    inTimeline detailedPatrol `shouldBe` inTimeline patrol
+  it "is described with the operator's names of the branches where no span has a name" $ do
+    let text = "stopped its task after 3.1 s (took 0.3 s) -> recovery"
+    inTree nameless `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ text]
+    inTerminal nameless `shouldBe` ["battery 9.4 -> batteryLow True", text]
+    inTimeline nameless `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ text]
+  it "is described with the operator's name where no signal has one" $ do
+    inTree (map unnamed nameless) `shouldBe` ["monitor changed -> stopped its task after 3.1 s (took 0.3 s) -> recovery"]
+    take 1 (inTerminal (map unnamed nameless)) `shouldBe` ["monitor changed"]
+  it "has the names of all spans that were stopped, up to three" $ do
+    inTree (several 3) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" after" `isInfixOf`)
+    inTree (several 5) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
+    inTerminal (several 5) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
+  it "has the first span that was started, if there are several" $ do
+    let events = patrol ++ [Began (Span 9 (Inside 1) Named "later" 50 (Just 4))]
+    inTree events `shouldBe` inTree patrol
+    inTerminal events `shouldBe` inTerminal patrol
+  it "has a failure without the words that the library puts before it" $ do
+    let failed text = [Ended (Span 1 Top Named "open" 0 Nothing) 1 (FailedWith text)]
+    tree (failed "the behaviour failed: the front door is locked") `shouldSatisfy` any ("open: failed: the front door is locked" `isInfixOf`)
+    tree (failed "the behaviour failed") `shouldSatisfy` ("open: failed" `elem`) . map (drop 23)
+    concatMap (plainTexts . (: [])) (treeLines 30 100 1 (foldl' watch nothingYet (failed "the behaviour failed: the front door is locked")))
+      `shouldSatisfy` any ("failed: the front door is locked" `isInfixOf`)
+ where
+  tree = lines . renderTree . recording
+  plainTexts = map plain
+
+-- The texts of reactions in the tree.
+inTree :: [Event] -> [String]
+inTree events = [drop 2 text | line <- lines (renderTree (recording events)), text@('!' : _) <- [dropWhile (/= '!') line]]
+
+-- The two lines in the terminal.
+inTerminal :: [Event] -> [String]
+inTerminal events = case dropWhile ((/= "◆ ") . take 2) (map plain (treeLines 30 200 100 (foldl' watch nothingYet events))) of
+  first : second : _ -> [takeWhile (/= ',') (drop 2 first), drop 2 second]
+  _ -> []
+
+-- The label beside the marker; the arrow is another character there.
+inTimeline :: [Event] -> [String]
+inTimeline events =
+  [ concatMap (\c -> if c == '→' then "->" else [c]) (unwords [textOf p | p <- parts])
+  | text@(Element "text" _ parts) <- either error everything (readXml (Text.unpack (timeline (recording events))))
+  , "stopped " `isInfixOf` textOf text
+  , length parts == 2
+  ]
+
+changes :: [Change]
+changes = [Change "battery" Nothing "9.4", Change "batteryLow" Nothing "True"]
+
+low :: Int -> End
+low n = StoppedBy (SignalChanged n changes)
+
+reaction :: Event
+reaction = Reacted (Reaction 4 (Inside 1) "monitor" 3.1 changes (Just (StoppedBranch "task" 3.1 0.3 (low 4))) (Just "recovery"))
+
+-- A span is stopped with one in it; another one is started.
+patrol :: [Event]
+patrol =
+  [ Began (Span 1 Top Named "patrol" 0 Nothing)
+  , Began (Span 2 (Inside 1) Named "drive" 0 Nothing)
+  , Began (Span 3 (Inside 2) Named "steer" 1 Nothing)
+  , Ended (Span 3 (Inside 2) Named "steer" 1 Nothing) 3.4 (low 4)
+  , Ended (Span 2 (Inside 1) Named "drive" 0 Nothing) 3.4 (low 4)
+  , reaction
+  , Began (Span 5 (Inside 1) Named "recharge" 3.4 (Just 4))
+  , Began (Span 6 (Inside 5) Named "dock" 3.4 Nothing)
+  , Ended (Span 6 (Inside 5) Named "dock" 3.4 Nothing) 10 Succeeded
+  , Ended (Span 5 (Inside 1) Named "recharge" 3.4 (Just 4)) 60 Succeeded
+  , Ended (Span 1 Top Named "patrol" 0 Nothing) 60 Succeeded
+  ]
+
+detailedPatrol :: [Event]
+detailedPatrol =
+  [ Began (Span 1 Top Named "patrol" 0 Nothing)
+  , Began operator
+  , Began task
+  , Began drive
+  , Ended drive 3.4 (low 4)
+  , Ended task 3.4 (low 4)
+  , Reacted (Reaction 4 (Inside 10) "monitor" 3.1 changes (Just (StoppedBranch "task" 3.1 0.3 (low 4))) (Just "recovery"))
+  , Began recovery
+  , Began recharge
+  , Ended recharge 60 Succeeded
+  , Ended recovery 60 Succeeded
+  , Ended operator 60 Succeeded
+  , Ended (Span 1 Top Named "patrol" 0 Nothing) 60 Succeeded
+  ]
+ where
+  operator = Span 10 (Inside 1) Operator "monitor" 0 Nothing
+  task = Span 11 (Inside 10) Branch "task" 0 Nothing
+  drive = Span 12 (Inside 11) Named "drive" 0 Nothing
+  recovery = Span 13 (Inside 10) Branch "recovery" 3.4 (Just 4)
+  recharge = Span 14 (Inside 13) Named "recharge" 3.4 Nothing
+
+nameless :: [Event]
+nameless = [Began patrolling, reaction, Ended patrolling 60 Succeeded]
+ where
+  patrolling = Span 1 Top Named "patrol" 0 Nothing
+
+unnamed :: Event -> Event
+unnamed event = case event of
+  Reacted r -> Reacted r {reactionChanges = []}
+  other -> other
+
+several :: Int -> [Event]
+several n = concat [[Began (robot k), Ended (robot k) 3.4 (low 4)] | k <- [1 .. n]] ++ [reaction]
+ where
+  robot k = Span (10 + k) Top Named ("robot " ++ show k) 0 Nothing

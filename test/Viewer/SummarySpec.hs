@@ -1,0 +1,79 @@
+module Viewer.SummarySpec (spec) where
+
+import Control.Exception (evaluate)
+import Data.List (isInfixOf)
+import System.Timeout (timeout)
+import Test.Hspec
+import Test.QuickCheck hiding (total)
+
+import Behavior.Trace
+import Behavior.Trace.Diff (difference, renderDifference)
+import Behavior.Trace.Recording
+import Behavior.Trace.Summary
+import Behavior.Trace.Tree (renderTree)
+import Viewer.Examples
+import Viewer.Generate
+import Viewer.Golden
+
+spec :: Spec
+spec = do
+  describe "of a mission" (goldenText "mission-summary.txt" (text mission))
+  describe "with all kinds of events" (goldenText "detailed-summary.txt" (text detailed))
+  describe "of no events" (goldenText "empty-summary.txt" (text []))
+  it "has the number of runs, their total, median and maximum, and their outcomes" $
+    timesOfPath ["mission", "survey"] (times (summary (recording mission)))
+      `shouldSatisfy` maybe False (\t -> runs t == 2 && near (total t) 11.9 && near (median t) 3.4 && near (longest t) 8.5 && outcomes t == [("stopped", 1), ("succeeded", 1)])
+  it "counts each named span once" . property $ \(Related events) ->
+    let r = recording events
+    in sum (map (runs . snd) (times (summary r))) === length [n | n <- nodes r, spanKind (nodeSpan n) == Named]
+  it "has all outcomes of a path" . property $ \(Related events) ->
+    conjoin [sum (map snd (outcomes t)) === runs t | (_, t) <- times (summary (recording events))]
+  it "leaves operators and branches out of paths" $
+    map fst (times (summary (recording detailed))) `shouldContain` [path ["patrol", "grip"]]
+  it "has the largest total first" . property $ \(Related events) ->
+    let totals = map (total . snd) (times (summary (recording events)))
+    in and (zipWith (>=) totals (drop 1 totals))
+  it "counts a run that has not ended until the end of the recording" $
+    timesOfPath ["radio"] (times (summary (recording mission)))
+      `shouldBe` Just (Times {runs = 1, total = 10, median = 10, longest = 10, outcomes = [("not ended", 1)]})
+  it "counts an interruption by the signal that the operator watches" $
+    interruptions (summary (recording mission)) `shouldBe` [("batteryLow", Interruptions 1 0.3)]
+  it "counts an interruption whose reaction was lost" $
+    interruptions (summary (recording [e | e <- mission, not (isReaction e)])) `shouldBe` [("batteryLow", Interruptions 1 0)]
+  it "counts no interruption where an operator was waiting" $
+    interruptions (summary (recording (take 2 detailed))) `shouldBe` []
+  it "has each failure with its path, and how many times there was one" $
+    failures (summary (recording (mission ++ ended 20 Top "try" 41 Nothing 42 (FailedWith "no") ++ ended 21 Top "try" 42 Nothing 43 (FailedWith "no"))))
+      `shouldBe` [ (path ["try"], "failed: no", 2)
+                 , (path ["mission", "enter room", "front door"], "failed: locked", 1)
+                 , (path ["mission", "survey", "photograph the north wall"], "faulted: camera: no such device", 1)
+                 ]
+  it "has each failure and fault of a span with a name" . property $ \(Related events) ->
+    let r = recording events
+        howMany = length [() | n <- nodes r, spanKind (nodeSpan n) == Named, Just (_, end) <- [nodeEnd n], isFailure end]
+    in sum [n | (_, _, n) <- failures (summary r)] === howMany
+  it "reports lost events" . property $ \(Related events) (Positive n) ->
+    let r = recording (Lost n : events)
+    in conjoin
+        [ lostEvents (summary r) === sum [m | Lost m <- Lost n : events]
+        , property ("lost: what is shown is incomplete" `isInfixOf` renderSummary (summary r))
+        ]
+  it "says nothing of lost events when there are none" $
+    renderSummary (summary (recording mended)) `shouldSatisfy` not . isInfixOf "lost"
+  it "of a hundred thousand runs of one name is made at once, and so are the differences and the tree" $ do
+    let r = recording (concat [ended n Top "again" (fromIntegral n) Nothing (fromIntegral n + 1) Succeeded | n <- [1 .. 100000]])
+    made <- timeout 60000000 . evaluate $
+      length (renderSummary (summary r)) + length (renderDifference (difference r r)) + length (renderTree r)
+    made `shouldSatisfy` maybe False (> 100000)
+  it "is made of ten thousand spans in each other" $
+    length (renderSummary (summary (recording (concat [ended n (Inside (n - 1)) "deeper" 0 Nothing 1 Succeeded | n <- [1 .. 10000]]))))
+      `shouldSatisfy` (> 10000)
+ where
+  text = renderSummary . summary . recording
+  timesOfPath names found = lookup (innermostFirst (path names)) [(innermostFirst p, t) | (p, t) <- found]
+  near a b = abs (a - b) < 1e-9
+  isReaction (Reacted _) = True
+  isReaction _ = False
+  isFailure (FailedWith _) = True
+  isFailure (FaultedWith _) = True
+  isFailure _ = False

@@ -1,0 +1,164 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+module Viewer.TraceEventsSpec (spec) where
+
+import Control.Monad (forM_)
+import Data.Aeson hiding (pairs)
+import qualified Data.Aeson.KeyMap as KeyMap
+import Data.Aeson.Types (Parser, parseEither)
+import qualified Data.ByteString.Lazy as Bytes
+import Data.List (nub, tails)
+import qualified Data.Map.Strict as Map
+import Data.Scientific (Scientific)
+import Data.Text (Text)
+import qualified Data.Text as Text
+import Test.Hspec
+import Test.QuickCheck
+
+import Behavior.Trace
+import Behavior.Trace.Recording
+import Behavior.Trace.TraceEvents
+import Viewer.Examples
+import Viewer.Generate
+import Viewer.Golden
+
+spec :: Spec
+spec = do
+  describe "of a mission" (golden "mission-trace-events.json" (render mission))
+  describe "with all kinds of events" (golden "detailed-trace-events.json" (render detailed))
+  it "has lanes that nest and flows with both ends" . withMaxSuccess 1000 . property $ \(Related events) ->
+    checked (render events) === []
+  it "has them with any times and texts" . property $ \(AnyEvents events) -> checked (render events) === []
+  it "has each span once, with its own times" . property $ \(Related events) ->
+    let r = recording events
+        times n = (name n, micro (spanBegan (nodeSpan n) - begin r), micro (max 0 (nodeUntil r n - spanBegan (nodeSpan n))))
+        micro t = realToFrac t * 1000000
+    in fmap (\s -> Map.fromListWith (+) [((sName c, sBegin c, sEnd c - sBegin c), 1 :: Int) | c <- fst s]) (parsed (render events))
+        === Right (Map.fromListWith (+) [(times n, 1) | n <- nodes r])
+  it "has a span on a lane inside those only that it really ran in" . withMaxSuccess 1000 . property $ \(Related events) ->
+    let r = recording events
+        outer = Map.fromList (concatMap (surround []) (roots r))
+        surround above n = (name n, above) : concatMap (surround (name n : above)) (nodeChildren n)
+        strangers spans =
+          [ (a, b)
+          | (a, b) <- pairs spans
+          , sLane a == sLane b
+          , overlapping a b
+          , sName b `notElem` outer Map.! sName a
+          , sName a `notElem` outer Map.! sName b
+          ]
+    in fmap (strangers . fst) (parsed (render events)) === Right []
+  it "has one lane for what runs one after the other" $
+    fmap (nub . map sLane . fst) (parsed (render (filter (not . radio) mission))) `shouldBe` Right [1]
+  it "has a flow from what was stopped to what was started" $
+    fmap (map (\f -> (fPhase f, fTime f)) . snd) (parsed (render mission)) `shouldBe` Right [("s", 9100000), ("f", 9400000)]
+  it "has a flow for each span that a reaction started, if it stopped one" $ do
+    let low = StoppedBy (SignalChanged 9 [])
+        stopped = ended 1 Top "a" 0 Nothing 1 low
+        started = ended 2 Top "b" 1 (Just 9) 2 Succeeded ++ ended 3 Top "c" 1 (Just 9) 2 Succeeded
+    fmap (length . snd) (parsed (render (stopped ++ started))) `shouldBe` Right 4
+    fmap (length . snd) (parsed (render started)) `shouldBe` Right 0
+    fmap (length . snd) (parsed (render stopped)) `shouldBe` Right 0
+  it "marks what has not ended, and shows it until the end of the recording" $
+    fmap (\s -> [(sEnd c, sOutcome c) | c <- fst s, sName c == "radio"]) (parsed (render mission)) `shouldBe` Right [(40000000, "not ended")]
+  it "has no numbers of spans among the arguments" . property $ \(Related events) ->
+    fmap (nub . map sArguments . fst) (parsed (render events)) `elem` [Right [["outcome"]], Right []]
+  it "is made of ten thousand spans at the same time, and of as many in each other" $ do
+    let size events = length (either (const []) fst (parsed (render events)))
+    size (concat [ended n Top "x" (fromIntegral n) Nothing 20000 Succeeded | n <- [1 .. 10000]]) `shouldBe` 10000
+    size (concat [ended n (Inside (n - 1)) "x" 0 Nothing 1 Succeeded | n <- [1 .. 10000]]) `shouldBe` 10000
+
+  describe "is checked by a checker that" $ do
+    it "finds lanes that overlap" $ checked (file [x 1 0 10, x 1 5 10]) `shouldSatisfy` any (Text.isInfixOf "overlap")
+    it "allows what is in the other, and what follows it" $ checked (file [x 1 0 10, x 1 0 4, x 1 4 6, x 1 10 1, x 2 5 10]) `shouldBe` []
+    it "finds flows without an end, or without a beginning" $
+      forM_ ["s", "f"] $ \phase ->
+        checked (file [x 1 0 10, flow phase 1 1 5]) `shouldSatisfy` any (Text.isInfixOf "both ends")
+    it "finds flows that begin or end outside of every span" $
+      checked (file [x 1 0 10, flow "s" 1 1 5, flow "f" 1 2 6]) `shouldSatisfy` any (Text.isInfixOf "outside")
+    it "finds flows that lead back in time" $
+      checked (file [x 1 0 10, flow "s" 1 1 5, flow "f" 1 1 4]) `shouldSatisfy` any (Text.isInfixOf "back")
+    it "allows a flow from span to span" $ checked (file [x 1 0 10, x 2 6 3, flow "s" 1 1 5, flow "f" 1 2 6]) `shouldBe` []
+    it "finds what is no JSON" $ checked "{" `shouldSatisfy` not . null
+ where
+  render = renderTraceEvents . recording
+  begin Recording {from = t} = t
+  name = Text.pack . spanName . nodeSpan
+  radio event = case event of
+    Began s -> spanName s == "radio"
+    _ -> False
+  file events = encode (object ["traceEvents" .= (events :: [Value])])
+  x :: Int -> Int -> Int -> Value
+  x tid ts dur =
+    object ["ph" .= ("X" :: Text), "pid" .= (1 :: Int), "tid" .= tid, "ts" .= ts, "dur" .= dur, "name" .= ("x" :: Text), "args" .= object ["outcome" .= ("" :: Text)]]
+  flow :: Text -> Int -> Int -> Int -> Value
+  flow phase i tid ts = object ["ph" .= phase, "pid" .= (1 :: Int), "id" .= i, "tid" .= tid, "ts" .= ts]
+
+-- * The checker
+
+data Complete = Complete
+  { sLane :: Int
+  , sBegin :: Scientific
+  , sEnd :: Scientific
+  , sName :: Text
+  , sOutcome :: Text
+  , sArguments :: [Key]
+  }
+  deriving (Eq, Show)
+
+data Flow = Flow
+  { fPhase :: Text
+  , fId :: Int
+  , fLane :: Int
+  , fTime :: Scientific
+  }
+  deriving (Eq, Show)
+
+-- | What is wrong with the file.
+checked :: Bytes.ByteString -> [Text]
+checked content = case parsed content of
+  Left why -> ["no trace-event file: " <> Text.pack why]
+  Right (spans, flows) ->
+    ["spans overlap: " <> shown (a, b) | (a, b) <- pairs spans, sLane a == sLane b, not (apart a b || inside a b || inside b a)]
+      ++ concatMap (flowProblems spans) (Map.toList (Map.fromListWith (flip (++)) [(fId f, [f]) | f <- flows]))
+ where
+  apart a b = sEnd a <= sBegin b || sEnd b <= sBegin a
+  inside a b = sBegin b <= sBegin a && sEnd a <= sEnd b
+
+flowProblems :: [Complete] -> (Int, [Flow]) -> [Text]
+flowProblems spans (_, found) = case found of
+  [s, f]
+    | (fPhase s, fPhase f) /= ("s", "f") -> ["a flow without both ends: " <> shown found]
+    | fTime f < fTime s -> ["a flow leads back: " <> shown found]
+    | not (all inSpan found) -> ["a flow is outside of every span: " <> shown found]
+    | otherwise -> []
+  _ -> ["a flow without both ends: " <> shown found]
+ where
+  inSpan f = or [sLane s == fLane f && sBegin s <= fTime f && (fTime f < sEnd s || sBegin s == sEnd s && fTime f == sEnd s) | s <- spans]
+
+parsed :: Bytes.ByteString -> Either String ([Complete], [Flow])
+parsed content = eitherDecode content >>= parseEither (withObject "file" (\o -> o .: "traceEvents" >>= fmap mconcat . traverse entry))
+
+entry :: Object -> Parser ([Complete], [Flow])
+entry o = do
+  phase <- o .: "ph"
+  case phase :: Text of
+    "X" -> do
+      begin <- o .: "ts"
+      lasts <- o .: "dur"
+      arguments <- o .: "args"
+      s <- Complete <$> o .: "tid" <*> pure begin <*> pure (begin + lasts) <*> o .: "name" <*> arguments .: "outcome" <*> pure (KeyMap.keys arguments)
+      if lasts < 0 then fail "negative duration" else pure ([s], [])
+    "M" -> pure ([], [])
+    _ | phase `elem` ["s", "f"] -> (\f -> ([], [f])) <$> (Flow phase <$> o .: "id" <*> o .: "tid" <*> o .: "ts")
+    _ -> fail ("phase " ++ Text.unpack phase)
+
+pairs :: [a] -> [(a, a)]
+pairs xs = [(x, y) | x : ys <- tails xs, y <- ys]
+
+-- With an interval that both of them contain.
+overlapping :: Complete -> Complete -> Bool
+overlapping a b = max (sBegin a) (sBegin b) < min (sEnd a) (sEnd b)
+
+shown :: Show a => a -> Text
+shown = Text.pack . show

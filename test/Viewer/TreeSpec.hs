@@ -1,0 +1,36 @@
+module Viewer.TreeSpec (spec) where
+
+import Data.List (isInfixOf)
+import Data.Maybe (isNothing)
+import Test.Hspec
+import Test.QuickCheck
+
+import Behavior.Trace
+import Behavior.Trace.Recording
+import Behavior.Trace.Tree
+import Viewer.Examples
+import Viewer.Generate
+import Viewer.Golden
+
+spec :: Spec
+spec = do
+  describe "of a mission" (goldenText "mission-tree.txt" (tree mission))
+  describe "with all kinds of events" (goldenText "detailed-tree.txt" (tree detailed))
+  it "has a line for each span and each reaction, and one for what was lost" . property $ \(Related events) ->
+    let r = recording events
+    in length (lines (renderTree r)) === 1 + length (nodes r) + length (reactions r) + (if lost r == 0 then 0 else 1)
+  it "reports lost events also when it has nothing else" $
+    renderTree (recording [Lost 2]) `shouldSatisfy` ("2 events were lost" `isInfixOf`)
+  it "is that of the events in any order" . property $ \(Related events) ->
+    -- (Of damaged traces, which repeat numbers, only the last event with each number counts.)
+    let each = distinct events
+    in forAll (shuffle each) $ \other -> renderTree (recording other) === renderTree (recording each)
+ where
+  tree = renderTree . recording
+  distinct events = [e | (i, e) <- numbered events, all (\(j, f) -> j >= i || number e /= number f || isNothing (number e)) (numbered events)]
+  numbered = zip [0 :: Int ..]
+  number event = case event of
+    Began s -> Just (spanNumber s)
+    Ended s _ _ -> Just (spanNumber s)
+    Reacted r -> Just (reactionNumber r)
+    Lost _ -> Nothing
