@@ -11,6 +11,7 @@ import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
 import Behavior.Sim (Schedule (..))
+import Behavior.Trace.Viewing (liveTree, viewEvents, viewing)
 import Exploration
 import Mission
 import Options
@@ -19,11 +20,13 @@ main :: IO ()
 main = do
   o <- getArgs >>= handleParseResult . parse
   hSetBuffering stdout LineBuffering -- so that a pipe gets each line at once
+  let printed = if liveTree (shown o) then const (pure ()) else putStrLn
   how <- runBehavior $ case mode o of
-    Really -> end <$> mission o putStrLn
+    Really -> end <$> viewing (shown o) (mission o printed)
     Simulated number -> do
-      (report, m) <- simulated o (maybe NonPreemptive (Seeded . fromInteger) number)
-      traverse_ putStrLn report
+      (report, m, events') <- simulatedWithEvents o (maybe NonPreemptive (Seeded . fromInteger) number)
+      traverse_ printed report
+      viewEvents (shown o) events'
       pure (maybe NotOver end m)
     Explored n -> do
       missions <- explored n o

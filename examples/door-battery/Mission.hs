@@ -7,6 +7,7 @@ module Mission
   , status
   , mission
   , simulated
+  , simulatedWithEvents
   ) where
 
 import Control.Exception (ErrorCall (..), Handler (..), catches, displayException, throwIO)
@@ -18,6 +19,7 @@ import Behavior.Parallel (firstOf)
 import Behavior.STM (readTVarIO)
 import Behavior.Sim (Outcome (..), Run (..), Schedule, defaults, explain, simulateWith)
 import qualified Behavior.Sim as Sim
+import Behavior.Trace (Event, named)
 import WorldChange
 import Options
 import Programs (behavior)
@@ -69,7 +71,7 @@ mission o printLine = do
   factor <- maybe (pure (pure 1)) variation (seed o)
   world <- newWorld (settingOf o factor)
   let robot = firstOf [behavior (program o), flat world]
-      narrated = inWorld world (narrating world (printLine . describe) robot)
+      narrated = named "mission" $ inWorld world (narrating world (printLine . describe) robot)
   (how, why) <-
     (narrated >> succeeded world)
       `catches` [Handler (failedWith world), Handler (\BatteryFlat -> pure (RanFlat, ""))]
@@ -113,19 +115,23 @@ failedWith world failure = do
 --
 -- (The lines are not printed meanwhile: a simulation must not block on output.)
 simulated :: Options -> Schedule -> IO ([String], Maybe Mission)
-simulated o schedule' = do
+simulated o schedule' = (\(report, m, _) -> (report, m)) <$> simulatedWithEvents o schedule'
+
+-- | The same, and the events of the run.
+simulatedWithEvents :: Options -> Schedule -> IO ([String], Maybe Mission, [Event])
+simulatedWithEvents o schedule' = do
   printed <- newIORef []
   run <- simulateWith options' (mission o (\text -> modifyIORef printed (text :)))
   report <- reverse <$> readIORef printed
   case outcome run of
-    Returned m -> pure (report, Just m)
-    OutOfTime -> notOver report
-    Livelock _ -> notOver report -- the hour would never pass
+    Returned m -> pure (report, Just m, events run)
+    OutOfTime -> notOver report run
+    Livelock _ -> notOver report run -- the hour would never pass
     Faulting e -> throwIO e
     Cancelled e -> throwIO e
     other -> throwIO (ErrorCall ("the simulation: " ++ explain other))
  where
-  notOver report = pure (report ++ [inWords NotOver], Nothing)
+  notOver report run = pure (report ++ [inWords NotOver], Nothing, events run)
   options' =
     defaults
       { Sim.scheduled = schedule'

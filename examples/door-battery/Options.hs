@@ -15,6 +15,8 @@ import Data.List (intercalate, stripPrefix)
 import Options.Applicative
 import Text.Read (readMaybe)
 
+import Behavior.Trace.Viewing (Viewing, nothing)
+import ViewingOptions (viewingOptions)
 import World (DoorState (..))
 
 data Options = Options
@@ -29,6 +31,7 @@ data Options = Options
   , speedFactor :: Double
   , seed :: Maybe Integer
   , mode :: Mode
+  , shown :: Viewing
   }
   deriving (Eq, Show)
 
@@ -55,6 +58,9 @@ parse arguments = execParserPure defaultPrefs commandLine arguments >>= checked
         refuse $
           "option --threshold: program " ++ programName (program o) ++ " is printed with a \
           \threshold of its own; allowed: " ++ show printedThreshold
+    | Explored _ <- mode o
+    , shown o /= nothing =
+        refuse "options --trace, --timeline and --tree show one mission; allowed: without --explore"
     | otherwise = pure o
   refuse why = Failure (parserFailure defaultPrefs commandLine (ErrorMsg why) [])
 
@@ -96,6 +102,7 @@ options =
         , help "vary the length of every action but recharge by up to 20 %, each N in its own way"
         ])
     <*> (simulation <|> exploration <|> pure Really)
+    <*> viewingOptions
  where
   simulation =
     flag' Simulated (long "simulate" <> help "the same in virtual time: the whole report is printed at once")

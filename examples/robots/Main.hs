@@ -2,18 +2,20 @@
 -- Four robots with simulated hardware, in real time: each prints what it does, for some seconds.
 module Main (main) where
 
-import Control.Exception (onException, throwIO)
+import Control.Exception (ErrorCall (..), onException, throwIO)
 import Control.Monad (forever, void, when)
 import Data.List (intercalate)
-import System.Environment (getArgs)
-import System.Exit (ExitCode (..), exitWith)
-import System.IO (BufferMode (..), hPutStrLn, hSetBuffering, stderr, stdout)
+import Options.Applicative
+import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Message (withInbox)
+import Behavior.Sim (Outcome (Returned), Run (..), defaults, endAt, explain, simulateWith)
 import Behavior.Sim.Mock (begin, condition, driver, newMock, set, signal)
+import Behavior.Trace (named)
+import Behavior.Trace.Viewing (Viewing (..), viewEvents, viewing)
 import Drone (Drone (Drone), drone)
 import qualified Drone
 import Fleet (Fleet (Fleet), Robot (Robot), fleet)
@@ -21,26 +23,51 @@ import qualified Fleet
 import Patrol (Patrol (Patrol), patrol)
 import qualified Patrol
 import PickAndPlace
+import ViewingOptions (viewingOptions)
 
 main :: IO ()
 main = do
   hSetBuffering stdout LineBuffering
-  arguments <- getArgs
-  case arguments of
-    [name] | Just demo <- lookup name demos -> runBehavior (demo >> putStrLn "the demo is over")
-    _ -> do
-      hPutStrLn stderr ("robots: not a robot: " ++ show (unwords arguments) ++ "; allowed: " ++ intercalate ", " (map fst demos))
-      exitWith (ExitFailure 2)
+  o <- customExecParser defaultPrefs commandLine
+  let say = if liveTree (shown o) then const (pure ()) else putStrLn
+      mission = named "mission" (demo o say) >> say "the demo is over"
+  runBehavior $
+    if inSimulation o
+      then do
+        run <- simulateWith defaults {endAt = 3600} mission
+        viewEvents (shown o) (events run)
+        case outcome run of
+          Returned () -> pure ()
+          other -> throwIO (ErrorCall ("the simulation: " ++ explain other))
+      else viewing (shown o) mission
 
-demos :: [(String, Behavior ())]
+data Options = Options
+  { demo :: (String -> Behavior ()) -> Behavior ()
+  , inSimulation :: Bool
+  , shown :: Viewing
+  }
+
+commandLine :: ParserInfo Options
+commandLine =
+  info (helper <*> options) (fullDesc <> failureCode 2 <> progDesc "Runs a robot with simulated hardware, for some seconds: it prints what it does.")
+ where
+  options =
+    Options
+      <$> argument (eitherReader chosen) (metavar "ROBOT" <> help names)
+      <*> switch (long "simulate" <> help "run it in virtual time")
+      <*> viewingOptions
+  chosen name = maybe (Left ("not a robot: " ++ show name ++ "; allowed: " ++ names)) Right (lookup name demos)
+  names = intercalate ", " (map fst demos)
+
+demos :: [(String, (String -> Behavior ()) -> Behavior ())]
 demos = [("patrol", patrolDemo), ("pick-and-place", pickAndPlaceDemo), ("drone", droneDemo), ("fleet", fleetDemo)]
 
--- | An action that takes time: prints when it starts, and when it is stopped early.
-step :: String -> Seconds -> Behavior ()
-step name seconds = putStrLn name >> sleep seconds `onException` putStrLn ("(stopped: " ++ name ++ ")")
+-- | An action that takes time: says when it starts, and when it is stopped early.
+step :: (String -> Behavior ()) -> String -> Seconds -> Behavior ()
+step say name seconds = named name $ say name >> sleep seconds `onException` say ("(stopped: " ++ name ++ ")")
 
-patrolDemo :: Behavior ()
-patrolDemo = do
+patrolDemo :: (String -> Behavior ()) -> Behavior ()
+patrolDemo say = do
   world <- newMock
   low <- condition world "battery low" [(0, False), (2.3, True)]
   seen <- condition world "person seen" [(0, False), (4, True)]
@@ -49,18 +76,18 @@ patrolDemo = do
   patrol
     Patrol
       { Patrol.waypoints = ["gate", "yard", "store"]
-      , Patrol.driveTo = \place -> step ("drive to the " ++ place) 0.8
-      , Patrol.report = \place -> putStrLn ("all is well at the " ++ place)
-      , Patrol.recharge = step "recharge" 0.7 >> set low False
-      , Patrol.investigate = step "say hello to the person" 0.7 >> set seen False
-      , Patrol.motorsOff = putStrLn "motors off"
+      , Patrol.driveTo = \place -> step say ("drive to the " ++ place) 0.8
+      , Patrol.report = \place -> say ("all is well at the " ++ place)
+      , Patrol.recharge = step say "recharge" 0.7 >> set low False
+      , Patrol.investigate = step say "say hello to the person" 0.7 >> set seen False
+      , Patrol.motorsOff = say "motors off"
       , Patrol.batteryLow = signal low
       , Patrol.personSeen = signal seen
       , Patrol.redButton = signal button
       }
 
-pickAndPlaceDemo :: Behavior ()
-pickAndPlaceDemo = do
+pickAndPlaceDemo :: (String -> Behavior ()) -> Behavior ()
+pickAndPlaceDemo say = do
   world <- newMock
   -- The first grip misses the part; it slips once on the way.
   held <- condition world "holding" [(0, False)]
@@ -68,23 +95,23 @@ pickAndPlaceDemo = do
   moves <- newTVarIO (0 :: Int)
   let slips = do
         n <- atomically (modifyTVar' moves (+ 1) >> readTVar moves)
-        when (n == 1) (sleep 0.5 >> putStrLn "(the part slips)" >> set held False)
+        when (n == 1) (sleep 0.5 >> say "(the part slips)" >> set held False)
   pickAndPlace
     Arm
       { detectors = [pure 12.1, forever (sleep 3600), sleep 0.3 >> pure 12.5]
       , moveTo = \place -> case place of
-          Box -> void (both (step "move to the box" 1) slips)
-          _ -> step ("move to " ++ show place) 0.5
+          Box -> void (both (step say "move to the box" 1) slips)
+          _ -> step say ("move to " ++ show place) 0.5
       , gripper = \grip' -> do
-          step ("gripper: " ++ show grip') 0.3
+          step say ("gripper: " ++ show grip') 0.3
           holds <- if grip' == Open then pure False else atomically (stateTVar grips (\left -> (take 1 left == [True], drop 1 left)))
           set held holds
       , holding = signal held
-      , park = step "park the arm" 0.5
+      , park = step say "park the arm" 0.5
       }
 
-droneDemo :: Behavior ()
-droneDemo = do
+droneDemo :: (String -> Behavior ()) -> Behavior ()
+droneDemo say = do
   world <- newMock
   windy <- condition world "strong wind" [(0, False)]
   low <- condition world "battery low" [(0, False), (4.5, True)]
@@ -92,29 +119,29 @@ droneDemo = do
   begin world
   drone
     Drone
-      { Drone.motorsOn = putStrLn "motors on"
-      , Drone.takeOff = step "take off" 0.5
-      , Drone.land = step "land" 0.5
-      , Drone.motorsOff = putStrLn "motors off"
-      , Drone.flyTo = \place -> step ("fly to " ++ place) 0.8
+      { Drone.motorsOn = say "motors on"
+      , Drone.takeOff = step say "take off" 0.5
+      , Drone.land = step say "land" 0.5
+      , Drone.motorsOff = say "motors off"
+      , Drone.flyTo = \place -> step say ("fly to " ++ place) 0.8
       , Drone.home = "home"
-      , Drone.film = putStrLn "camera on" >> sleep 3600 `onException` putStrLn "camera off"
+      , Drone.film = say "camera on" >> sleep 3600 `onException` say "camera off"
       , Drone.firstPath = ["row 1", "row 2", "row 3", "row 4", "row 5"]
       , Drone.nextPath = do
           again <- readTVarIO crane
           sleep (if again then 3600 else 1.2)
           atomically (writeTVar crane True)
-          putStrLn "(there is a crane: the planner computes a new path)"
+          say "(there is a crane: the planner computes a new path)"
           sleep 0.6
           pure ["row 5", "row 4", "row 3"]
       , Drone.timeLimit = 60
       , Drone.strongWind = signal windy
       , Drone.batteryLow = signal low
-      , Drone.logLine = putStrLn
+      , Drone.logLine = say
       }
 
-fleetDemo :: Behavior ()
-fleetDemo = do
+fleetDemo :: (String -> Behavior ()) -> Behavior ()
+fleetDemo say = do
   world <- newMock
   orders <- driver world "orders" [(0.1, n) | n <- [1 .. 6]]
   chargers <- atomically (newTSem 1)
@@ -125,12 +152,12 @@ fleetDemo = do
           Robot
             { Fleet.name = who
             , Fleet.carry = \order -> do
-                step (who ++ ": carry order " ++ show order) 1
+                step say (who ++ ": carry order " ++ show order) 1
                 when (who == "Bo" && order > 3) (throwIO (userError "a wheel is lost"))
             , Fleet.handOver = \order -> do
-                putStrLn (who ++ ": order " ++ show order ++ " is handed over")
+                say (who ++ ": order " ++ show order ++ " is handed over")
                 atomically (modifyTVar' handedOver (+ 1))
-            , Fleet.charge = step (who ++ ": charge") 0.8 >> set low False
+            , Fleet.charge = step say (who ++ ": charge") 0.8 >> set low False
             , Fleet.batteryLow = signal low
             , Fleet.withdrawn = pure False
             }
@@ -138,4 +165,4 @@ fleetDemo = do
   begin world
   withInbox 10 orders $ \inbox ->
     Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver))
-      ||| fleet Fleet {Fleet.orders = inbox, Fleet.chargers = chargers, Fleet.logLine = putStrLn} robots
+      ||| fleet Fleet {Fleet.orders = inbox, Fleet.chargers = chargers, Fleet.logLine = say} robots

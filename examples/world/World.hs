@@ -60,7 +60,6 @@ import Numeric.Natural (Natural)
 import Battery
 import Behavior
 import Behavior.Parallel (firstOf)
-import qualified Behavior.Signal as Signal
 import Behavior.STM
   ( STM
   , TVar
@@ -74,6 +73,7 @@ import Behavior.STM
   , writeTVar
   )
 import Behavior.Time (now)
+import Behavior.Trace (named)
 import WorldChange
 
 -- | The initial state of a world, and its constants.
@@ -199,12 +199,15 @@ recharging world = bracket_ (rate (gain (setting world))) (rate (negate (drain (
 fillBattery :: World -> STM ()
 fillBattery world = modifyTVar' (battery world) filled
 
--- | Waits until the battery is flat, then throws 'BatteryFlat'.
+-- | Waits until the battery is flat, then throws 'BatteryFlat'. (It is written without a signal: a trace shows
+-- how the robot reacts, and not the world.)
 flat :: World -> Behavior a
-flat world = Signal.switch (Signal.watching (readTVar (battery world))) $ \b -> do
-  t <- clock world
-  wait world (lasts t b)
-  throwIO BatteryFlat
+flat world = readTVarIO (battery world) >>= unlessItChanges
+ where
+  unlessItChanges b = do
+    t <- clock world
+    firstOf [wait world (lasts t b) >> throwIO BatteryFlat, otherThan b] >>= unlessItChanges
+  otherThan b = atomically (readTVar (battery world) >>= \new -> if new == b then retry else pure new)
 
 -- | A fault of the world, which the robot cannot recover from.
 data BatteryFlat = BatteryFlat
@@ -225,7 +228,7 @@ changeBattery world change =
 -- the time that the world defines, and then has its effect, or fails with the reason that
 -- the effect returns (changes that the effect has made remain).
 perform :: World -> String -> STM (Either String a) -> Behavior a
-perform world name effect = mask $ \restore -> do
+perform world name effect = named name $ mask $ \restore -> do
   record world name (const Begins) (pure ())
   restore (lasting (setting world) world name) `catch` \e -> do
     record world name (const (unfinished e)) (pure ())
