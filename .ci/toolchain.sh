@@ -22,10 +22,16 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 # The libraries that GHC does not include, each with its Debian package.
 libraries=(
+  aeson:libghc-aeson-dev
+  ansi-terminal:libghc-ansi-terminal-dev
   async:libghc-async-dev
   hspec:libghc-hspec-dev
+  HUnit:libghc-hunit-dev
   optparse-applicative:libghc-optparse-applicative-dev
   QuickCheck:libghc-quickcheck2-dev
+  scientific:libghc-scientific-dev
+  svg-builder:libghc-svg-builder-dev
+  terminal-size:libghc-terminal-size-dev
   unliftio-core:libghc-unliftio-core-dev
 )
 debian_packages=(ghc cabal-install "${libraries[@]#*:}")

@@ -22,6 +22,7 @@ import Behavior
 import Behavior.Parallel (allOf, decide, firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically)
+import Behavior.Trace (Sink (..), named, withTrace)
 import Measured
 
 main :: IO ()
@@ -30,8 +31,9 @@ main =
     getArgs >>= \case
       [] -> measureOperators
       ["fallback"] -> measureAll trying
+      ["traces", setting] -> measureAll (tracing setting)
       ["idle"] -> measureBareIdle >> mapM_ measureIdle [10, 100, 1000]
-      _ -> die "usage: operators [fallback | idle]"
+      _ -> die "usage: operators [fallback | idle | traces SETTING]"
 
 measureOperators :: IO ()
 measureOperators = do
@@ -80,6 +82,24 @@ succeeds = pure ()
 {-# NOINLINE succeeds #-}
 fails = throwIO Failed
 {-# NOINLINE fails #-}
+
+-- | What names and traces cost, with a sink that keeps up. The name of a setting (of the runtime) is
+-- part of their names.
+tracing :: String -> [Case]
+tracing setting =
+  [ each (setting ++ " no name") 4000000 succeeds
+  , each (setting ++ " named") 4000000 (named "span" succeeds)
+  , traced "named" 50000 (named "span" succeeds)
+  , Case (setting ++ " traced named, by two") 50000 $ \n ->
+      inTrace (both (replicateM_ (n `div` 2) (named "span" succeeds)) (replicateM_ (n `div` 2) (named "span" succeeds)))
+  , each (setting ++ " parallel") 10000 (parallel succeeds succeeds)
+  , traced "parallel" 10000 (parallel succeeds succeeds)
+  , each (setting ++ " monitor") 10000 (Signal.monitor (pure False) succeeds succeeds)
+  , traced "monitor" 10000 (Signal.monitor (pure False) succeeds succeeds)
+  ]
+ where
+  traced name times act = Case (setting ++ " traced " ++ name) times (\n -> inTrace (replicateM_ n act))
+  inTrace = withTrace [EachEvent (\_ -> pure ())]
 
 pairs :: Behavior () -> [Case]
 pairs blocked =

@@ -10,13 +10,13 @@ import Row
 
 promises :: [Group]
 promises =
-  [trying, together, reacting, manyBranches, rules, unchangedRules, longPrograms]
+  [trying, together, reacting, manyBranches, rules, unchangedRules, longPrograms, traces]
     ++ [reactions, coldReactions, besideComputation, plainReactions, idleFleet, fleetBytes, fleetTime]
     ++ [seamTime, seamBytes, simulator, simulatedDay, explorations]
 
 -- What the operators cost, compared with the same by hand or in a behaviour tree.
 
-trying, together, reacting, manyBranches, rules, unchangedRules, longPrograms :: Group
+trying, together, reacting, manyBranches, rules, unchangedRules, longPrograms, traces :: Group
 trying =
   operators
     "Fallback: nanoseconds"
@@ -70,6 +70,21 @@ longPrograms =
     , "fallback, a step" `within` 1 `times` "py_trees fallback step"
     , "fallback, a step" `within` 1.1 `times` "try that fails"
     ]
+
+-- A span is two events.
+traces =
+  Group "Traces, with a sink that keeps up: nanoseconds" "-A4m, with -N1 or -N2" $
+    concat
+      [ [ at n "named" `beside` at n "no name"
+        , at n "traced named" `atMost` 2 * microseconds
+        , at n "traced named, by two" `atMost` 2 * microseconds
+        , at n "traced parallel" `beside` at n "parallel"
+        , at n "traced monitor" `beside` at n "monitor"
+        ]
+      | n <- ["N1", "N2"]
+      ]
+ where
+  at n what = fromString (n ++ " " ++ what)
 
 operators :: String -> [Row] -> Group
 operators title = Group title "-N1 -A4m"
