@@ -264,7 +264,6 @@ causes x =
       Just s -> possible s cause
       Nothing -> False
   siblings o = [(at, name, end') | (at, _, s, _, end') <- Map.elems (over x), spanKind s == Branch, spanParent s == Inside (spanNumber o), name <- maybeToList (stripPrefix (spanName o ++ ": ") (spanName s))]
-  siblingsThatRun o = [name | (_, _, s) <- Map.elems (begun x), spanParent s == Inside (spanNumber o), name <- [spanName s], name == spanName o ++ ": branch"]
   times = Map.fromList [(at, t) | (at, _, _, t, _) <- Map.elems (over x)]
   own s o cause =
     let name = fromMaybe "" (stripPrefix (spanName o ++ ": ") (spanName s))
@@ -283,7 +282,8 @@ causes x =
           (op, SiblingFailed n)
             | op `elem` ["parallel", "firstOf"] -> not (null (failedNow n)) && leftmost n (failedNow n) (not . isStopped) && operatorAgrees isFailed
             | op `elem` ["both", "allOf"] -> not (null (failedNow n)) && leftmost n (failedNow n) wrong && operatorAgrees isFailed
-          ("decide", SiblingFinished "enough") -> any (\(_, _, e) -> not (isStopped e)) others
+          ("decide", SiblingFinished ns) -> all (\n -> finishedNow n ++ failedNow n /= []) (inList ns) && any (not . null . finishedNow) (inList ns)
+          ("decide", SiblingFailed ns) -> all (not . null . failedNow) (inList ns)
           ("scoped", SiblingFinished "body") -> not (null (finishedNow "body"))
           ("scoped", SiblingFailed n)
             | n == "body" -> not (null (failedNow n))
@@ -295,8 +295,6 @@ causes x =
             Just (Timeout n _) -> limit == fromIntegral n && maybe False (\(_, _, _, t, _) -> t >= realToFrac (spanBegan o) + fromIntegral n) (Map.lookup (spanNumber s) (over x))
             _ -> False
           (op, _) | op `notElem` ["parallel", "firstOf", "both", "allOf", "decide", "scoped", "withShared"] -> case cause of
-            -- (It decided by its first reading, which is no reaction.)
-            SignalChanged 0 [] -> op `elem` ["waitUntil", "whileHolding"] && null [() | (_, r) <- Map.elems (reacted x), reactionParent r == Inside (spanNumber o)] && null (siblingsThatRun o)
             SignalChanged n these -> maybe False (\(_, r) -> reactionParent r == Inside (spanNumber o) && reactionOperator r == op && reactionChanges r == these) (Map.lookup n (reacted x))
             SiblingFinished n -> not (null (finishedNow n))
             -- Nothing runs after the failure of a sensor. (What had been started may begin, and is stopped.)
@@ -304,6 +302,10 @@ causes x =
             SiblingFailed n -> not (null (failedNow n))
             _ -> False
           _ -> False
+  inList = map (filter (/= ' ')) . splitAtCommas
+  splitAtCommas text = case break (== ',') text of
+    (n, _ : rest) -> n : splitAtCommas rest
+    (n, []) -> [n]
   position n = if n `elem` ["left", "body"] then 0 else maybe 1 fst (listToMaybe (reads n)) :: Int
   isFailed = \case FailedWith _ -> True; _ -> False
   isFault = \case FaultedWith _ -> True; _ -> False
@@ -336,7 +338,7 @@ reactionsOf x =
                       , e == stoppedEnd b
                       , at' < at
                       , t == realToFrac (reactionTime r + stoppingTook b)
-                      , not (isStopped e) || stoppedByIt r e || True
+                      , not (isStopped e) || stoppedByIt r e
                       ]
                    ]
                 ++ ["out of time: " ++ show r | reactionTime r < spanBegan o || maybe False (\b -> stoppedAfter b < 0 || stoppingTook b < 0) (reactionStopped r)]
@@ -358,7 +360,7 @@ values x =
   es = entries (record' x)
   decides p r = case [(changeBefore c, changeAfter c) | c <- reactionChanges r, changeSignal c == "level"] of
     [(before, after)]
-      | now <- holds (read after), was <- holds . read <$> before -> case p of
+      | not (isTeleoReactive p), now <- holds (read after), was <- holds . read <$> before -> case p of
           RSelect {} -> maybe True (\b -> (stoppedName b == "left") /= now && was == Just (not now)) (reactionStopped r)
           Monitor {} -> if isJust (reactionStopped r) then now else now == (reactionStarts r /= Just "task")
           InsteadWhen {} -> now
@@ -366,11 +368,13 @@ values x =
           WaitUntil _ -> now
           Switch _ _ -> isNothing (reactionStopped r) || before /= Just after
           _ -> True
-    [] -> case p of
-      TeleoReactive _ -> True
-      Timeout _ _ -> True
+    levels -> case p of
+      -- (Equal changes are reported once.)
+      TeleoReactive rules -> length levels < length rules || maybe True (/= firstToHold (map snd levels)) (firstToHold <$> traverse fst levels)
+      Timeout _ _ -> null levels
       _ -> False
-    _ -> False
+  firstToHold = length . takeWhile (not . holds . read)
+  isTeleoReactive = \case TeleoReactive _ -> True; _ -> False
   direct p = not (any (`isInfixOf` show (signalsOf p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
   signalsOf = \case
     RSelect s _ _ -> [s]

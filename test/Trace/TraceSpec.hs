@@ -16,8 +16,9 @@ import Test.Hspec
 
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
-import Behavior.Parallel (allOf, await, firstOf, fork, requestStop, scoped, tryAwait)
+import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (Options (scheduled), Run (events), Schedule (..), defaults, simulateWith)
 import Behavior.Time (abandoning, atomically, cleanupWithin, timeout)
 import Behavior.Trace
 import Memory (inConstantMemory)
@@ -146,6 +147,8 @@ causes = do
   cause "the third sibling finished" (\begun stoppable -> firstOf [stoppable, hang, pass begun]) (SiblingFinished "3")
   cause "the second sibling failed" (\begun stoppable -> void (allOf [stoppable, pass begun >> failed]) ? pure ()) (SiblingFailed "2")
   cause "a time limit" (\_ stoppable -> timeout 0.1 stoppable ? pure ()) (TimeLimit 0.1)
+  cause "decide was certain because of a result" (\begun stoppable -> decide (\ends -> pure () <$ listToMaybe [() | Just (Right ()) <- ends]) [stoppable, pass begun, hang]) (SiblingFinished "2")
+  cause "decide was certain because of a failure" (\begun stoppable -> decide (\ends -> pure () <$ listToMaybe [() | Just (Left _) <- ends]) [stoppable, hang, pass begun >> failed]) (SiblingFailed "3")
   cause "what is forked ends with its scope" (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >> pass begun)) (SiblingFinished "body")
   cause "requestStop" (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >>= \c -> pass begun >> requestStop c >> untilStopped c)) (FromOutside "requestStop")
   cause "a cancellation from outside, also deep inside" (\begun stoppable -> cancelledFrom begun (both hang (firstOf [stoppable]))) (FromOutside (show (Cancel "user")))
@@ -202,6 +205,28 @@ reactions = do
   it "is not reported when an operator only begins" $ do
     (_, seen) <- traceOf (Signal.monitor (pure False) (pure ()) (pure ()) >> Signal.rSelect (pure True) (pure ()) (pure ()))
     [() | Reacted _ <- seen] `shouldBe` []
+
+  it "is reported when an operator ends at its first reading" $ do
+    (_, seen) <- traceOf (Signal.waitUntil (Signal.named "calm" (pure True)))
+    [(reactionChanges r, reactionStopped r, reactionStarts r) | Reacted r <- seen] `shouldBe` [([Change "calm" Nothing "True"], Nothing, Nothing)]
+
+  it "has the values of the transaction that decided, whatever changes them afterwards" $
+    for_ [1 .. 200] $ \seed -> do
+      run <- simulateWith defaults {scheduled = Seeded seed} $ do
+        level <- newTVarIO (0 :: Int)
+        let high = (> 0) <$> Signal.named "level" (Signal.watching (readTVar level))
+            set = atomically . writeTVar level
+            later n = sleep 1 >> set n >> sleep 9
+        firstOf [Signal.rSelect high (sleep 9) (sleep 9), later 1, later 0, later 2, later 0]
+      [c | Reacted r <- events run, c <- reactionChanges r, (changeBefore c == Just "0") == (changeAfter c == "0")] `shouldBe` []
+
+  it "shows two signals of the same name, each with its own values" $ do
+    left <- newTVarIO (1 :: Int)
+    right <- newTVarIO (2 :: Int)
+    let wheel = Signal.named "wheel" . Signal.watching . readTVar
+        bothStopped = (\l r -> l == 0 && r == 0) <$> wheel left <*> wheel right
+    (_, seen) <- traceOf (Signal.insteadWhen bothStopped (pure ()) (atomically (mapM_ (`writeTVar` 0) [left, right]) >> hang))
+    [reactionChanges r | Reacted r <- seen] `shouldBe` [[Change "wheel" (Just "1") "0", Change "wheel" (Just "2") "0"]]
 
   it "gives a condition without a name a name" $ do
     level <- newTVarIO False

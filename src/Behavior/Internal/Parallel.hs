@@ -20,9 +20,11 @@ module Behavior.Internal.Parallel
 import Control.Concurrent.STM (STM, TVar, catchSTM, check, modifyTVar', newTVarIO, readTVar, retry)
 import Control.Exception (ErrorCall (..), SomeException, evaluate, fromException, throwIO)
 import Control.Monad (foldM, join, void, (<=<), (<$!>))
+import Data.Either (isLeft)
 import Data.Foldable (toList)
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
+import Data.List (intercalate)
 import Data.Traversable (mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, BehaviorFailed, failed)
@@ -217,30 +219,38 @@ decide choose behaviors =
     Nothing -> join . structured "decide" $ \scope -> do
       ends <- newTVarIO (Right IntMap.empty)
       void $ startAll (\n -> branchWithHook (addEnd ends n) scope (Label "decide" (show n))) behaviors
-      Verdict (SiblingFinished "enough") <$> chooseAfter ends 0
+      chooseAfter ends IntMap.empty
  where
   -- What the function throws is caught where it runs: what is thrown in the operator's thread
   -- would be taken for an exception from outside.
   chooseAfter ends seen = join . atomically $
     readTVar ends >>= \case
-      Left fault -> pure (pure (throwIO fault))
+      Left (n, fault) -> pure (pure (Verdict (SiblingFailed (show n)) (throwIO fault)))
       Right known -> do
-        check (IntMap.size known > seen || count == 0)
-        (chosenOf ends known <$> (pure $! choose (inOrder known))) `catchSTM` \e -> pure (pure (throwIO (e :: SomeException)))
-  chosenOf ends known = \case
-    Just chosen -> pure (pure chosen)
+        check (IntMap.size known > IntMap.size seen || count == 0)
+        let verdict = Verdict (newEnds (known IntMap.\\ seen))
+        (chosenOf ends known verdict <$> (pure $! choose (inOrder known))) `catchSTM` \e -> pure (pure (verdict (throwIO (e :: SomeException))))
+  chosenOf ends known verdict = \case
+    Just chosen -> pure (verdict (pure chosen))
     Nothing
-      | IntMap.size known == count -> pure (throwIO (ErrorCall "decide: all behaviours have ended, and the function has chosen none"))
-      | otherwise -> chooseAfter ends (IntMap.size known)
+      | IntMap.size known == count -> pure (verdict (throwIO (ErrorCall "decide: all behaviours have ended, and the function has chosen none")))
+      | otherwise -> chooseAfter ends known
   inOrder known = [IntMap.lookup n known | n <- [1 .. count]]
   count = length behaviors
 
--- | Adds how a branch has ended: its failure or result, or a fault in place of all of them.
-addEnd :: TVar (Either SomeException (IntMap (Either BehaviorFailed a))) -> Int -> Outcome a -> STM ()
+-- | How the branches with these numbers have ended, or the first fault.
+type Ends a = Either (Int, SomeException) (IntMap (Either BehaviorFailed a))
+
+-- | Adds how a branch has ended.
+addEnd :: TVar (Ends a) -> Int -> Outcome a -> STM ()
 addEnd ends n end = modifyTVar' ends $ case (end, result end) of
   (_, Right a) -> (IntMap.insert n (Right a) <$!>)
   (Failing _, Left e) | Just failure <- fromException e -> (IntMap.insert n (Left failure) <$!>)
-  (_, Left e) -> (>> Left e)
+  (_, Left e) -> (>> Left (n, e))
+
+-- | Why the rest is stopped when these branches have ended: they failed, or not all of them did.
+newEnds :: IntMap (Either BehaviorFailed a) -> Cause
+newEnds new = (if all isLeft new then SiblingFailed else SiblingFinished) (intercalate ", " (map show (IntMap.keys new)))
 
 -- | The container with its elements replaced by those of the list, which has as many.
 refilled :: Traversable t => t x -> [a] -> t a

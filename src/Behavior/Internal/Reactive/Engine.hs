@@ -101,12 +101,14 @@ readWakeup engine sensors seen value =
 decideOn :: Engine k a -> Maybe Ran -> Maybe Values -> Wakeup k a -> IO Decision
 decideOn engine ran before = \case
   Changed _ _ (TimeIsUp limit _) -> pure (timeIsUp limit)
-  Changed _ values next | isJust before || isRecovery next -> decide (operator engine) ran before values
+  Changed _ values next | isJust before || isReaction next -> decide (operator engine) ran before values
   Changed _ values _ -> pure (begins values)
   _ -> pure sensorDied
  where
-  isRecovery next = case next of
+  -- At the beginning.
+  isReaction next = case next of
     RunToEnd _ _ -> True
+    Conclude _ -> True
     _ -> False
 
 -- | Does what the wakeup requires. No branch runs.

@@ -26,8 +26,9 @@ module Behavior.Internal.Trace.Decision
   ) where
 
 import Control.Exception (SomeException, mask_)
-import Data.Function (on)
-import Data.List (nubBy)
+import Data.List (mapAccumL, nub)
+import qualified Data.Map.Strict as Map
+import Data.Maybe (fromMaybe)
 
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Stop (endOf)
@@ -69,7 +70,7 @@ decide operator branch before after =
     Just here -> do
       n <- newNumber here
       t <- traceClock (trace here)
-      let changes = [Change name (before >>= lookup name) value | (name, value) <- nubBy ((==) `on` fst) after]
+      let changes = changesBetween (fromMaybe [] before) after
           reaction =
             Reaction
               { reactionNumber = n
@@ -81,6 +82,18 @@ decide operator branch before after =
               , reactionStarts = Nothing
               }
       pure (Decision (SignalChanged n changes) after (Just (Unreported here branch reaction)))
+
+-- | What the values were before, and are now. (Several signals may have the same name: then the first
+-- belongs to the first, and so on.)
+changesBetween :: Values -> Values -> [Change]
+changesBetween before after =
+  nub [Change name (Map.lookup key was) value | (key@(name, _), value) <- numbered after]
+ where
+  was = Map.fromList (numbered before)
+  numbered = snd . mapAccumL number Map.empty
+  number seen (name, value) =
+    let n = Map.findWithDefault (0 :: Int) name seen
+     in (Map.insert name (n + 1) seen, ((name, n), value))
 
 -- | The operator only begins: there was no change.
 begins :: Values -> Decision
