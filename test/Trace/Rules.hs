@@ -282,8 +282,8 @@ causes x =
           (op, SiblingFailed n)
             | op `elem` ["parallel", "firstOf"] -> not (null (failedNow n)) && leftmost n (failedNow n) (not . isStopped) && operatorAgrees isFailed
             | op `elem` ["both", "allOf"] -> not (null (failedNow n)) && leftmost n (failedNow n) wrong && operatorAgrees isFailed
-          ("decide", SiblingFinished ns) -> all (\n -> finishedNow n ++ failedNow n /= []) (inList ns) && any (not . null . finishedNow) (inList ns)
-          ("decide", SiblingFailed ns) -> all (not . null . failedNow) (inList ns)
+          ("decide", SiblingFinished ns) -> all (\n -> finishedNow n ++ failedNow n /= []) (inList ns) && not (all (null . finishedNow) (inList ns))
+          ("decide", SiblingFailed ns) -> not (any (null . failedNow) (inList ns))
           ("scoped", SiblingFinished "body") -> not (null (finishedNow "body"))
           ("scoped", SiblingFailed n)
             | n == "body" -> not (null (failedNow n))
@@ -370,7 +370,7 @@ values x =
           _ -> True
     levels -> case p of
       -- (Equal changes are reported once.)
-      TeleoReactive rules -> length levels < length rules || maybe True (/= firstToHold (map snd levels)) (firstToHold <$> traverse fst levels)
+      TeleoReactive rules -> length levels < length rules || Just (firstToHold (map snd levels)) /= (firstToHold <$> traverse fst levels)
       Timeout _ _ -> null levels
       _ -> False
   firstToHold = length . takeWhile (not . holds . read)
