@@ -87,7 +87,11 @@ andThen, orElse :: Now -> Running -> Program -> Running
 andThen t (Over (Succeeded _)) second = begin t second
 andThen _ (Over other) _ = Over other
 andThen _ first second = first `AndThen` second
-orElse t (Over (Failed _)) second = begin t second
+orElse t (Over (Failed _)) second = case begin t second of
+  -- What fails at once does so after the first's failure has been caught: there a request is received
+  -- that the first did not receive.
+  Over (Failed _) -> Starting second
+  begun -> begun
 orElse _ (Over other) _ = Over other
 orElse _ first second = first `OrElse` second
 
