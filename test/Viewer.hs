@@ -14,6 +14,7 @@ import qualified Viewer.TextSpec
 import qualified Viewer.ToolSpec
 import qualified Viewer.TraceEventsSpec
 import qualified Viewer.TreeSpec
+import qualified Viewer.ViewingSpec
 
 main :: IO ()
 main = hspec $ do
@@ -29,4 +30,5 @@ main = hspec $ do
   describe "The differences" Viewer.DiffSpec.spec
   describe "The trace-event format" Viewer.TraceEventsSpec.spec
   describe "Texts of others" Viewer.TextSpec.spec
+  describe "Viewing" Viewer.ViewingSpec.spec
   describe "behavior-trace" Viewer.ToolSpec.spec

@@ -4,6 +4,7 @@ import Data.List (foldl', isInfixOf)
 import qualified Data.Text.Lazy as Text
 import Test.Hspec
 
+import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Recording
 import Behavior.Trace.Svg
@@ -31,6 +32,17 @@ spec = do
   it "is described with the operator's name where no signal has one" $ do
     inTree (map unnamed nameless) `shouldBe` ["monitor changed -> stopped its task after 3.1 s (took 0.3 s) -> recovery"]
     take 1 (inTerminal (map unnamed nameless)) `shouldBe` ["monitor changed"]
+  it "has the time of the span that was stopped, not that of its branch" $ do
+    let words' = "stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""
+    inTree secondStep `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ words']
+    inTerminal secondStep `shouldBe` ["battery 9.4 -> batteryLow True", words']
+    inTimeline secondStep `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ words']
+  it "has the time of each span, if they differ" $ do
+    inTree (stoppedAt 60 [57, 55]) `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
+    inTree (stoppedAt 60 [57, 55, 55, 55]) `shouldSatisfy` any ("\"robot 2\" after 5 s, \"robot 3\" after 5 s and 1 more (took" `isInfixOf`)
+    inTerminal (stoppedAt 60 [57, 55]) `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
+  it "has no negative time, if a span began while its branch was stopped" $
+    inTree (stoppedAt 60 [60.1]) `shouldSatisfy` any ("stopped \"robot 1\" after 0 s (took" `isInfixOf`)
   it "has the names of all spans that were stopped, up to three" $ do
     inTree (several 3) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" after" `isInfixOf`)
     inTree (several 5) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
@@ -75,7 +87,11 @@ low :: Int -> End
 low n = StoppedBy (SignalChanged n changes)
 
 reaction :: Event
-reaction = Reacted (Reaction 4 (Inside 1) "monitor" 3.1 changes (Just (StoppedBranch "task" 3.1 0.3 (low 4))) (Just "recovery"))
+reaction = reactionAt 3.1
+
+-- It stops a branch that began at 0.
+reactionAt :: Seconds -> Event
+reactionAt t = Reacted (Reaction 4 (Inside 1) "monitor" t changes (Just (StoppedBranch "task" t 0.3 (low 4))) (Just "recovery"))
 
 -- A span is stopped with one in it; another one is started.
 patrol :: [Event]
@@ -116,6 +132,18 @@ detailedPatrol =
   recovery = Span 13 (Inside 10) Branch "recovery" 3.4 (Just 4)
   recharge = Span 14 (Inside 13) Named "recharge" 3.4 Nothing
 
+-- The branch has run for a minute, its second step only at the end.
+secondStep :: [Event]
+secondStep =
+  [ Began (Span 1 Top Named "patrol" 0 Nothing)
+  , Ended (Span 2 (Inside 1) Named "plan" 0 Nothing) 56.9 Succeeded
+  , Ended (Span 3 (Inside 1) Named "drive" 56.9 Nothing) 60.3 (low 4)
+  , reactionAt 60
+  , Began (Span 5 (Inside 1) Named "recharge" 60.3 (Just 4))
+  , Ended (Span 5 (Inside 1) Named "recharge" 60.3 (Just 4)) 90 Succeeded
+  , Ended (Span 1 Top Named "patrol" 0 Nothing) 90 Succeeded
+  ]
+
 nameless :: [Event]
 nameless = [Began patrolling, reaction, Ended patrolling 60 Succeeded]
  where
@@ -127,6 +155,10 @@ unnamed event = case event of
   other -> other
 
 several :: Int -> [Event]
-several n = concat [[Began (robot k), Ended (robot k) 3.4 (low 4)] | k <- [1 .. n]] ++ [reaction]
+several n = stoppedAt 3.1 (replicate n 0)
+
+-- Several spans, each of which began at one of these times.
+stoppedAt :: Seconds -> [Seconds] -> [Event]
+stoppedAt t begins = concat [[Began robot, Ended robot (t + 0.3) (low 4)] | robot <- zipWith robotFrom [1 ..] begins] ++ [reactionAt t]
  where
-  robot k = Span (10 + k) Top Named ("robot " ++ show k) 0 Nothing
+  robotFrom k begin = Span (10 + k) Top Named ("robot " ++ show k) begin Nothing

@@ -2,7 +2,7 @@ module Viewer.SummarySpec (spec) where
 
 import Control.Exception (evaluate)
 import Data.List (isInfixOf)
-import System.Timeout (timeout)
+import System.Mem (getAllocationCounter, setAllocationCounter)
 import Test.Hspec
 import Test.QuickCheck hiding (total)
 
@@ -60,17 +60,26 @@ spec = do
         ]
   it "says nothing of lost events when there are none" $
     renderSummary (summary (recording mended)) `shouldSatisfy` not . isInfixOf "lost"
-  it "of a hundred thousand runs of one name is made at once, and so are the differences and the tree" $ do
-    let r = recording (concat [ended n Top "again" (fromIntegral n) Nothing (fromIntegral n + 1) Succeeded | n <- [1 .. 100000]])
-    made <- timeout 60000000 . evaluate $
-      length (renderSummary (summary r)) + length (renderDifference (difference r r)) + length (renderTree r)
-    made `shouldSatisfy` maybe False (> 100000)
+  describe "of four times as many runs of one name takes about four times as much work (if not 16 times)" $ do
+    let work render = [allocatedBy (render (runsOfOneName n)) | n <- [5000, 20000]]
+        shouldGrowLikeIt measured = do
+          [less, more] <- sequence measured
+          more `shouldSatisfy` (< 8 * less)
+    it "the summary" $ shouldGrowLikeIt (work (renderSummary . summary))
+    it "the differences" $ shouldGrowLikeIt (work (\r -> renderDifference (difference r r)))
+    it "the tree" $ shouldGrowLikeIt (work renderTree)
   it "is made of ten thousand spans in each other" $
     length (renderSummary (summary (recording (concat [ended n (Inside (n - 1)) "deeper" 0 Nothing 1 Succeeded | n <- [1 .. 10000]]))))
       `shouldSatisfy` (> 10000)
  where
   text = renderSummary . summary . recording
   timesOfPath names found = lookup (innermostFirst (path names)) [(innermostFirst p, t) | (p, t) <- found]
+  runsOfOneName n = recording (concat [ended k Top "again" (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. n]])
+  -- Bytes, in this thread.
+  allocatedBy made = do
+    setAllocationCounter 0
+    _ <- evaluate (length made)
+    negate <$> getAllocationCounter
   near a b = abs (a - b) < 1e-9
   isReaction (Reacted _) = True
   isReaction _ = False

@@ -64,28 +64,33 @@ plainLine (Lost n) = "(" ++ lostText n ++ " here)"
 
 -- | What changed, what the operator stopped, and what it starts: see 'reactionParts'.
 --
--- >>> putStrLn (reactionText ["drive"] (Just "recharge") reaction)
--- battery 9.4 (was 100) -> batteryLow True (was False) -> stopped "drive" after 3.1 s (took 0.3 s) -> "recharge"
-reactionText :: [String] -> Maybe String -> Reaction -> String
-reactionText names started r = intercalate " -> " (changed ++ done)
+-- >>> putStrLn (reactionText [("drive", 5)] (Just "recharge") reaction)
+-- battery 9.4 (was 100) -> batteryLow True (was False) -> stopped "drive" after 2.1 s (took 0.3 s) -> "recharge"
+reactionText :: [(String, Seconds)] -> Maybe String -> Reaction -> String
+reactionText spans started r = intercalate " -> " (changed ++ done)
  where
-  (changed, done) = reactionParts names started r
+  (changed, done) = reactionParts spans started r
 
 -- | The changes, each with its cause before it; and what the operator stopped, and what it starts. The
--- arguments are the names of the spans that it stopped, and the name of the first span that it started.
--- Where there is none, the operator's own name of the branch is used, without quotation marks.
+-- arguments are the name of each span that it stopped, and when that began; and the name of the first span that
+-- it started. Where there is none, the operator's own name of the branch is used, without quotation marks.
 --
 -- >>> snd (reactionParts [] Nothing reaction)
 -- ["stopped its task after 3.1 s (took 0.3 s)","recovery"]
+-- >>> let parts spans = head (snd (reactionParts spans Nothing reaction))
+-- >>> parts [("drive", 5), ("film", 5)]
+-- "stopped \"drive\", \"film\" after 2.1 s (took 0.3 s)"
+-- >>> parts [("drive", 5), ("film", 6)]
+-- "stopped \"drive\" after 2.1 s, \"film\" after 1.1 s (took 0.3 s)"
 -- >>> fst (reactionParts [] Nothing reaction {reactionChanges = []})
 -- ["monitor changed"]
-reactionParts :: [String] -> Maybe String -> Reaction -> ([String], [String])
-reactionParts names started r = (changed, maybe [] stopped (reactionStopped r) ++ starts)
+reactionParts :: [(String, Seconds)] -> Maybe String -> Reaction -> ([String], [String])
+reactionParts spans started r = (changed, maybe [] stopped (reactionStopped r) ++ starts)
  where
   changed = case reactionChanges r of
     [] -> [nameText (reactionOperator r) ++ " changed"]
     changes -> map changeText changes
-  stopped b = [stoppedText names b ++ " after " ++ secondsText (stoppedAfter b) ++ took b]
+  stopped b = [stoppedAfterText spans (reactionTime r) b ++ took b]
   took b = " (took " ++ secondsText (stoppingTook b) ++ although (stoppedEnd b) ++ ")"
   although Succeeded = ", it completed nevertheless"
   although (StoppedBy _) = ""
@@ -97,9 +102,25 @@ reactionParts names started r = (changed, maybe [] stopped (reactionStopped r) +
 -- >>> map (\names -> stoppedText names stopped) [[], ["drive"], ["drive", "film"]]
 -- ["stopped its task","stopped \"drive\"","stopped \"drive\", \"film\""]
 stoppedText :: [String] -> StoppedBranch -> String
-stoppedText names b = "stopped " ++ case splitAt 3 names of
-  ([], _) -> "its " ++ nameText (stoppedName b)
-  (known, more) -> intercalate ", " (map quoted known) ++ concat [" and " ++ show (length more) ++ " more" | not (null more)]
+stoppedText [] b = "stopped its " ++ nameText (stoppedName b)
+stoppedText names _ = "stopped " ++ upToThree (map quoted names)
+
+-- The same, and how long they had run at that time: once, if all had run equally long.
+stoppedAfterText :: [(String, Seconds)] -> Seconds -> StoppedBranch -> String
+stoppedAfterText spans time b = case map after spans of
+  [] -> stoppedText [] b ++ afterText (stoppedAfter b)
+  one : others
+    | all (== one) others -> stoppedText (map fst spans) b ++ one
+    | otherwise -> "stopped " ++ upToThree [quoted name ++ after s | s@(name, _) <- spans]
+ where
+  -- A span can begin between the decision and its stop.
+  after (_, began) = afterText (max 0 (time - began))
+  afterText t = " after " ++ secondsText t
+
+upToThree :: [String] -> String
+upToThree texts = intercalate ", " known ++ concat [" and " ++ show (length more) ++ " more" | not (null more)]
+ where
+  (known, more) = splitAt 3 texts
 
 -- | What was started, given the name of the span, if there is one, and that of the branch.
 startedText :: Maybe String -> String -> String

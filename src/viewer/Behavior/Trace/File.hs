@@ -27,7 +27,7 @@ module Behavior.Trace.File
   ) where
 
 import Control.Concurrent.MVar (newMVar, withMVar)
-import Control.Exception (IOException, bracket, evaluate, onException, throwIO, try)
+import Control.Exception (IOException, evaluate, mask, onException, throwIO, try)
 import Control.Monad (void, when, (>=>))
 import Data.Aeson (FromJSON, Object, Value (..), eitherDecode, parseJSON, withObject, withText, (.:), (.:?))
 import Data.Aeson.Encoding (Encoding, Series, int, list, pair, pairs)
@@ -83,14 +83,14 @@ version = 1
 -- If the file cannot be created, this fails before the action starts. If it cannot be written
 -- later, because the disk is full or the action has ended, the function throws an
 -- 'Control.Exception.IOException', and so does each later call: so only the last line can be
--- incomplete. What the action returns does not depend on that.
+-- incomplete. What the action returns does not depend on that. If all was written, but the file cannot
+-- be closed, that is thrown when the action has returned: a network drive may only then say that it is full.
 --
 -- @since 0.1.0.0
 withTraceFile :: FilePath -> (([Event] -> IO ()) -> IO a) -> IO a
-withTraceFile path action = bracket create close $ \file -> do
+withTraceFile path action = closing $ \file broken -> do
   zero <- now
   header <- Header <$> getCurrentTime
-  broken <- newIORef False
   lock <- newMVar ()
   let add lines' = do
         -- Computing a text may throw. So all of them are computed before any is written.
@@ -106,7 +106,14 @@ withTraceFile path action = bracket create close $ \file -> do
     -- There is no buffer: after a failed write, closing the file would write the buffer again.
     hSetBuffering file NoBuffering
     pure file
-  close file = void (try (hClose file) :: IO (Either IOException ()))
+  -- What the action throws, or what a write threw, is not followed by what closing the file throws.
+  closing use = mask $ \restore -> do
+    file <- create
+    broken <- newIORef False
+    result <- restore (use file broken) `onException` closeQuietly file
+    isBroken <- readIORef broken
+    result <$ (if isBroken then closeQuietly else hClose) file
+  closeQuietly file = void (try (hClose file) :: IO (Either IOException ()))
 
 -- | The content of a file with these events. Their times are relative to the zero of the header.
 --

@@ -46,7 +46,7 @@ renderTree r = unlines (heading : concatMap snd (sortOn fst (loose ++ map (branc
   reacted depth n = map (reaction depth) (IntMap.findWithDefault [] n inside)
   reaction depth x =
     (reactionTime x, [row (milliseconds (reactionTime x)) "" (indented depth ("! " ++ described x))])
-  described x = reactionText (map spanName stopped) (spanName <$> listToMaybe started) x
+  described x = reactionText [(spanName s, spanBegan s) | s <- stopped] (spanName <$> listToMaybe started) x
    where
     (stopped, started) = IntMap.findWithDefault ([], []) (reactionNumber x) involved
   involved = reactionSpans r

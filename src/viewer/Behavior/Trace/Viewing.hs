@@ -12,10 +12,11 @@ module Behavior.Trace.Viewing
   , viewEvents
   ) where
 
-import Control.Exception (IOException, finally, try)
+import Control.Applicative ((<|>))
+import Control.Exception (IOException, catch, mask, onException, throwIO, try)
 import Control.Monad (when)
-import Data.Foldable (for_)
-import Data.IORef (modifyIORef', newIORef, readIORef)
+import Data.Foldable (for_, traverse_)
+import Data.IORef (modifyIORef', newIORef, readIORef, writeIORef)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Text.Lazy.Encoding (encodeUtf8)
 import Data.Time.Clock.POSIX (posixSecondsToUTCTime)
@@ -54,21 +55,40 @@ nothing = Viewing {traceFile = Nothing, timelineFile = Nothing, liveTree = False
 --
 -- [Result, failure, fault, cancellation] Those of the behaviour. The files are written however it ends,
 --   also by SIGINT or SIGTERM under 'Behavior.runBehavior'.
--- [Files] One that cannot be created is an 'IOException', before the behaviour starts. One that
---   cannot be written later is reported on @stderr@: the behaviour goes on.
+-- [Fault] If a file cannot be created or written, the behaviour runs nevertheless; when it has returned, this
+--   throws the 'IOException', which names the file. (Of two files, one is reported on @stderr@.) If the
+--   behaviour throws, that goes on, and all such files are reported on @stderr@.
 --
 -- @since 0.1.0.0
 viewing :: Viewing -> Behavior a -> Behavior a
 viewing v act = toFile $ \file -> toTimeline $ \kept -> toTerminal $ \tree -> withTrace (map Batches (file ++ kept ++ tree)) act
  where
-  toFile use = maybe (use []) (\path -> withTraceFile path (use . pure)) (traceFile v)
+  toFile use = maybe (use []) (`toTraceFile` use) (traceFile v)
   toTerminal use = if liveTree v then withTerminal stdout (use . pure) else use []
   toTimeline use = case timelineFile v of
     Nothing -> use []
     Just path -> do
-      Bytes.writeFile path Bytes.empty
       seen <- newIORef []
-      use [\batch -> modifyIORef' seen (batch :)] `finally` (readIORef seen >>= reportingErrors . writeTimeline path . concat . reverse)
+      use [\batch -> modifyIORef' seen (batch :)] `andThen` (readIORef seen >>= writeTimeline path . concat . reverse)
+
+-- The function that adds events to the file; none if it cannot be created.
+toTraceFile :: FilePath -> ([[Event] -> IO ()] -> IO a) -> IO a
+toTraceFile path use = do
+  created <- newIORef False
+  result <- try . withTraceFile path $ \write -> writeIORef created True >> untilItFails write (use . pure)
+  wasCreated <- readIORef created
+  case result of
+    Right a -> pure a
+    Left e
+      | wasCreated -> throwIO (e :: IOException)
+      | otherwise -> use [] `andThen` throwIO e
+
+-- With a function that does not throw. What the first call threw that failed is thrown at the end.
+untilItFails :: ([Event] -> IO ()) -> (([Event] -> IO ()) -> IO a) -> IO a
+untilItFails write use = do
+  failed <- newIORef Nothing
+  use (\batch -> write batch `catch` \e -> modifyIORef' failed (<|> Just (e :: IOException)))
+    `andThen` (readIORef failed >>= traverse_ throwIO)
 
 -- | Shows the events of a run that is over, that of a simulation for example: of named spans
 -- only, as 'viewing' does. The times of the file are those of the events, from the beginning of 1970 on: so equal
@@ -79,15 +99,20 @@ viewing v act = toFile $ \file -> toTimeline $ \kept -> toTerminal $ \tree -> wi
 --
 -- @since 0.1.0.0
 viewEvents :: Viewing -> [Event] -> IO ()
-viewEvents v events = do
-  for_ (traceFile v) $ \path -> Bytes.writeFile path (renderTrace (Header (posixSecondsToUTCTime 0)) shown)
-  for_ (timelineFile v) (`writeTimeline` shown)
+viewEvents v events =
   when (liveTree v) (putStr (renderTree (recording shown)))
+    `andThen` for_ (timelineFile v) (`writeTimeline` shown)
+    `andThen` for_ (traceFile v) (`Bytes.writeFile` renderTrace (Header (posixSecondsToUTCTime 0)) shown)
  where
   shown = withoutOperators events
 
 writeTimeline :: FilePath -> [Event] -> IO ()
 writeTimeline path = Bytes.writeFile path . encodeUtf8 . timeline . recording
+
+-- 'finally', except that an 'IOException' of the second action does not replace what the first one threw: it is
+-- reported on @stderr@.
+andThen :: IO a -> IO () -> IO a
+andThen act end = mask $ \restore -> (restore act `onException` reportingErrors end) <* end
 
 reportingErrors :: IO () -> IO ()
 reportingErrors act = try act >>= either (\e -> hPutStrLn stderr ("viewing: " ++ show (e :: IOException))) pure

@@ -64,7 +64,7 @@ layInterruptions left right top barHeight x y placed recorded =
   rowY row = top + rowHeight * fromIntegral row + 9
   stopped = outermost [(n, p) | p <- placed, Just (_, StoppedBy (SignalChanged n _)) <- [nodeEnd (placedNode p)]]
   started = outermost [(n, p) | p <- placed, Just n <- [spanReaction (nodeSpan (placedNode p))]]
-  names r = bimap (map spanName) (fmap spanName . listToMaybe) (IntMap.findWithDefault ([], []) (reactionNumber r) involved)
+  names r = bimap (map (\s -> (spanName s, spanBegan s))) (fmap spanName . listToMaybe) (IntMap.findWithDefault ([], []) (reactionNumber r) involved)
   involved = reactionSpans recorded
   byNumber = IntMap.fromList [(spanNumber (nodeSpan (placedNode p)), p) | p <- placed]
 
@@ -118,9 +118,9 @@ together distance ((x, r) : rest) = Marker x (r : map snd near) : together dista
 
 -- The rows of the markers, so that no label lies over another one, nor (if possible) over an
 -- arrow. The last row
--- is for those that have no label. (Given the names of the spans that a reaction stopped, and of the
--- first one that it started.)
-rowsFor :: Double -> Double -> (Reaction -> ([String], Maybe String)) -> [Marker] -> [Label]
+-- is for those that have no label. (Given the names of the spans that a reaction stopped, and when each
+-- began; and the name of the first one that it started.)
+rowsFor :: Double -> Double -> (Reaction -> ([(String, Seconds)], Maybe String)) -> [Marker] -> [Label]
 rowsFor left right names markers = map final chosen
  where
   -- The longest texts with which as many as possible have one.
@@ -166,7 +166,7 @@ rowsFor left right names markers = map final chosen
   changesOf r = inertUpTo 120 (intercalate " → " (fst (partsOf r)))
   partsOf r = uncurry reactionParts (names r) r
   long r = arrows (snd (partsOf r))
-  short r = arrows (foldMap (pure . stoppedText (fst (names r))) (reactionStopped r) ++ foldMap (pure . startedText (snd (names r))) (reactionStarts r))
+  short r = arrows (foldMap (pure . stoppedText (map fst (fst (names r)))) (reactionStopped r) ++ foldMap (pure . startedText (snd (names r))) (reactionStarts r))
   arrows = unwords . map ("→ " ++)
 
 diamond :: Double -> Double -> Text

@@ -72,18 +72,19 @@ data Failed = Failed
   }
   deriving (Eq, Show)
 
--- | A reaction that stopped something, the names of the spans that it stopped, and of the first one
--- that it started, if they are known.
+-- | A reaction that stopped something, the spans that it stopped (the name of each, and when it began), and
+-- the name of the first one that it started, if they are known.
 data Interruption = Interruption
   { interruptedBy :: !Reaction
-  , interruptedSpans :: ![String]
+  , interruptedSpans :: ![(String, Seconds)]
   , startedSpan :: !(Maybe String)
   }
   deriving (Eq, Show)
 
--- | The name of a span, and the numbers of those that it ran in.
+-- | The name of a span, when it began, and the numbers of those that it ran in.
 data Stopped = Stopped
   { stoppedSpan :: !String
+  , stoppedBegan :: !Seconds
   , stoppedIn :: ![Int]
   }
   deriving (Eq, Show)
@@ -120,12 +121,13 @@ watch live event = case event of
   Reacted r
     | Just _ <- reactionStopped r ->
         (at (reactionTime r))
-          { liveInterruption = Just $! Interruption (clipReaction r) (map stoppedSpan (IntMap.findWithDefault [] (reactionNumber r) (liveStopped live))) Nothing
+          { liveInterruption = Just $! Interruption (clipReaction r) (map nameAndBegin (IntMap.findWithDefault [] (reactionNumber r) (liveStopped live))) Nothing
           , liveStopped = IntMap.delete (reactionNumber r) (liveStopped live)
           }
     | otherwise -> at (reactionTime r)
   Lost n -> live {liveLost = liveLost live + n}
  where
+  nameAndBegin s = (stoppedSpan s, stoppedBegan s)
   at t = live {liveTime = Just $! maybe t (max t) (liveTime live)}
 
 -- The first named span that the last interruption started.
@@ -165,7 +167,7 @@ ended s t end live = case spanParent s of
     | StoppedBy (SignalChanged n _) <- end, spanKind s == Named = lastOnes (IntMap.alter (Just . outermost) n (liveStopped live))
     | otherwise = liveStopped live
   outermost known =
-    keep maxStopped (Stopped (spanName s) (keep maxPath (map spanNumber (ancestors (liveActive live) s))) : filter (notElem number . stoppedIn) (concat known))
+    keep maxStopped (Stopped (spanName s) (spanBegan s) (keep maxPath (map spanNumber (ancestors (liveActive live) s))) : filter (notElem number . stoppedIn) (concat known))
   -- The reactions of some may be lost.
   lastOnes known = if IntMap.size known > maxReactions then IntMap.deleteMin known else known
   noted

@@ -4,6 +4,7 @@ module Behavior.Trace.Terminal.Tree
   ( treeLines
   ) where
 
+import Data.Bifunctor (first)
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (intercalate, sortOn)
@@ -105,7 +106,7 @@ interruptionLines width time live = case liveInterruption live of
     , [(Normal, "  " ++ intercalate " -> " done)]
     ]
    where
-    (changed, done) = reactionParts (map short (reverse (interruptedSpans i))) (short <$> startedSpan i) (interruptedBy i)
+    (changed, done) = reactionParts (map (first short) (reverse (interruptedSpans i))) (short <$> startedSpan i) (interruptedBy i)
  where
   short = cutTo (max 8 (width `div` 3))
 
