@@ -33,7 +33,7 @@ import Data.Aeson (FromJSON, Object, Value (..), eitherDecode, parseJSON, withOb
 import Data.Aeson.Encoding (Encoding, Series, int, list, pair, pairs)
 import Data.Aeson.Types (Key, Parser, parseEither)
 import Data.ByteString.Builder (Builder, char7, toLazyByteString)
-import qualified Data.ByteString as Strict
+import Data.ByteString.Unsafe (unsafeUseAsCStringLen)
 import qualified Data.ByteString.Lazy.Char8 as Bytes
 import Data.IORef (newIORef, readIORef, writeIORef)
 import Data.List (intercalate)
@@ -44,7 +44,11 @@ import qualified Data.Text.Lazy.Encoding as Lazy
 import qualified Data.Text.Encoding.Error as Text
 import Data.Time.Clock (UTCTime, getCurrentTime)
 import Data.Time.Format.ISO8601 (iso8601ParseM, iso8601Show)
-import System.IO (BufferMode (..), IOMode (..), hClose, hSetBuffering, openBinaryFile)
+import Foreign.Ptr (castPtr)
+import GHC.IO.Device (close, write)
+import GHC.IO.FD (openFile)
+import System.IO (IOMode (..))
+import System.IO.Error (ioeSetFileName, modifyIOError)
 
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Time (now)
@@ -97,23 +101,21 @@ withTraceFile path action = closing $ \file broken -> do
         bytes <- evaluate (Bytes.toStrict (toLazyByteString lines'))
         withMVar lock $ \() -> do
           readIORef broken >>= \is -> when is (throwIO (userError (path ++ ": an earlier event could not be written")))
-          Strict.hPut file bytes `onException` writeIORef broken True
+          naming (unsafeUseAsCStringLen bytes (\(start, size) -> write file (castPtr start) 0 size)) `onException` writeIORef broken True
   add (encodeHeader header)
   action (add . foldMap (encodeEvent . relativeTo zero))
  where
-  create = do
-    file <- openBinaryFile path WriteMode
-    -- There is no buffer: after a failed write, closing the file would write the buffer again.
-    hSetBuffering file NoBuffering
-    pure file
+  -- (No handle: after a failed write, to close one writes its buffer again.)
+  create = fst <$> naming (openFile path WriteMode False)
+  naming = modifyIOError (`ioeSetFileName` path)
   -- What the action throws, or what a write threw, is not followed by what closing the file throws.
   closing use = mask $ \restore -> do
     file <- create
     broken <- newIORef False
     result <- restore (use file broken) `onException` closeQuietly file
     isBroken <- readIORef broken
-    result <$ (if isBroken then closeQuietly else hClose) file
-  closeQuietly file = void (try (hClose file) :: IO (Either IOException ()))
+    result <$ (if isBroken then closeQuietly else naming . close) file
+  closeQuietly file = void (try (close file) :: IO (Either IOException ()))
 
 -- | The content of a file with these events. Their times are relative to the zero of the header.
 --
