@@ -35,8 +35,8 @@ data Options = Options
   }
   deriving (Eq, Show)
 
--- | The versions of the program in the paper.
-data Program = First | WithDo | OverDoors | WithAttempts | Introduction
+-- | The versions of the program in the paper, and one with names.
+data Program = First | WithDo | OverDoors | WithAttempts | Introduction | WithNames
   deriving (Eq, Show, Enum, Bounded)
 
 -- | How missions are run, and how many.
@@ -56,7 +56,7 @@ parse arguments = execParserPure defaultPrefs commandLine arguments >>= checked
   checked o
     | lowBelow o /= printedThreshold && program o `notElem` [First, WithDo] =
         refuse $
-          "option --threshold: program " ++ programName (program o) ++ " is printed with a \
+          "option --threshold: program " ++ programName (program o) ++ " is written with a \
           \threshold of its own; allowed: " ++ show printedThreshold
     | Explored _ <- mode o
     , shown o /= nothing =
@@ -87,11 +87,11 @@ options =
     <*> given "drain" "PERCENT" amount 4 "what it loses in a second"
     <*> given "charge" "PERCENT" factor 50 "what it gains in a second of charging"
     <*> given "threshold" "PERCENT" percent printedThreshold
-      "level below which it is low, for programs 1 and 2 (the others are printed with 10)"
+      "level below which it is low, for programs 1 and 2 (the others are written with 10)"
     <*> given "action" "SECONDS" amount 0.5 "how long an action takes"
-    <*> given "program" "NAME" aProgram WithDo 
+    <*> given "program" "NAME" aProgram WithDo
       ("version of the paper: " ++ allowed aProgram ++ "; 1 is kept as printed: if the front \
-       \door is open it opens it, if not it goes on without")
+       \door is open it opens it, if not it goes on without; names has names for what --timeline shows")
     <*> given "speed" "FACTOR" factor 1
       "how much faster than real time (the battery is read every 10 ms of real time; so it \
        \is in a simulation too, which is over at once whatever the factor)"
@@ -179,8 +179,9 @@ programName = \case
   OverDoors -> "3"
   WithAttempts -> "4"
   Introduction -> "intro"
+  WithNames -> "names"
 
--- | The threshold in the text of programs 3, 4 and intro.
+-- | The threshold in the text of programs 3, 4, intro and names.
 printedThreshold :: Int
 printedThreshold = 10
 

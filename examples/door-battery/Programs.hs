@@ -1,12 +1,13 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- The versions of the program: the paper's own listings.
+-- The versions of the program: the paper's own listings, and one with names.
 module Programs
   ( behavior
   ) where
 
 import Behavior (Behavior)
+import qualified Named
 import Options (Program (..))
 import qualified Paper.EachDoor as EachDoor
 import qualified Paper.EachDoorThreeTimes as EachDoorThreeTimes
@@ -21,3 +22,4 @@ behavior = \case
   OverDoors -> EachDoor.bt
   WithAttempts -> EachDoorThreeTimes.bt
   Introduction -> Introduction.bt
+  WithNames -> Named.bt

@@ -121,7 +121,7 @@ commandLine = do
       accepted ["--front", word, "--back", word] (\o -> (front o, back o)) `shouldBe` Just (state, state)
 
   it "accepts every version of the paper's program" $
-    for_ (zip ["1", "2", "3", "4", "intro"] [minBound ..]) $ \(word, chosen) ->
+    for_ (zip ["1", "2", "3", "4", "intro", "names"] [minBound ..]) $ \(word, chosen) ->
       accepted ["--program", word] program `shouldBe` Just chosen
 
   describe "rejects, with exit status 2 and the allowed values," $
