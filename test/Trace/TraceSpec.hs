@@ -7,15 +7,17 @@ module Trace.TraceSpec (spec) where
 import Control.Concurrent (forkIO)
 import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception
-import Control.Monad (void)
+import Control.Monad (join, void)
 import Data.Foldable (for_)
-import Data.IORef (modifyIORef', newIORef, readIORef)
+import Data.IORef (modifyIORef', newIORef, readIORef, writeIORef)
 import Data.List (isPrefixOf)
 import Data.Maybe (fromMaybe, listToMaybe)
 import Test.Hspec
 
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.Internal.Trace.Place (Place (trace), Receiver (..), inPlace, myPlace, withReceiver)
+import Behavior.Internal.Trace.Span (abandonableIn)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Options (scheduled), Run (events), Schedule (..), defaults, simulateWith)
@@ -175,6 +177,24 @@ causes = do
     [spanParent s | Began s <- seen, spanName s == "later"] `shouldBe` [UnknownParent]
     checkSpans seen
     eventually ((== living) <$> liveThreadCount)
+
+  it "it was abandoned, also at the moment when it begins" $ do
+    seen <- newIORef []
+    abandon <- newIORef (pure ())
+    let receive event = do
+          case event of
+            Began s | spanName s == "stuck" -> join (readIORef abandon)
+            _ -> pure ()
+          modifyIORef' seen (event :)
+    withTrace [] . named "outer" $ do
+      place <- myPlace >>= maybe (throwIO (Fault "there is no trace")) pure
+      mask_ . inPlace (Just place {trace = withReceiver (Receiver 1 False receive) (trace place)}) $ do
+        (stuck, abandoned) <- abandonableIn ((\here -> inPlace here (named "stuck" (pure ()))) <$> myPlace)
+        writeIORef abandon abandoned
+        stuck
+    reported <- reverse <$> readIORef seen
+    [event | event <- reported, Began _ <- [event]] `shouldBe` take 1 reported
+    [(spanName s, end) | Ended s _ end <- drop 1 reported] `shouldBe` [("stuck", StoppedBy WasAbandoned)]
  where
   cause what act expected =
     it what $ do

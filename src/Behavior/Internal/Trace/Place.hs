@@ -75,7 +75,8 @@ data Open = Open
   , openAt :: !Place
   -- ^ Where it began.
   , claimed :: !(IORef Bool)
-  -- ^ Whether its end has been reported. (If it may be abandoned, two threads can do that.)
+  -- ^ Whether its end has been reported, or may not be yet: its beginning comes first. (If it may be
+  -- abandoned, two threads can report its end.)
   }
 
 -- | A trace while it is made. A trace inside another one uses the numbers of the outer one,

@@ -21,9 +21,9 @@ module Behavior.Internal.Trace.Span
 import Control.Exception (SomeException, mask, throwIO, try)
 import Control.Monad (unless, when)
 import Data.Foldable (for_, traverse_)
-import Data.IORef (IORef, atomicModifyIORef', newIORef)
+import Data.IORef (IORef, atomicModifyIORef', atomicWriteIORef, newIORef, readIORef)
 import qualified Data.IntMap.Strict as IntMap
-import Data.Maybe (isJust)
+import Data.Maybe (isJust, isNothing)
 import Data.Traversable (for)
 
 import Behavior.Internal.Failure (Behavior)
@@ -114,12 +114,21 @@ spanning :: SpanKind -> String -> Place -> IO a -> IO (Either SomeException a)
 spanning kind name place act = do
   n <- newNumber place
   t <- traceClock (trace place)
-  open <- newIORef False >>= register . Open n kind name t place
+  open <- newIORef True >>= register . Open n kind name t place
   reportSpan Began open
+  hasBegun open
   end <- try (inPlace (Just (within open)) act)
   endOf end >>= \how -> endSpan how open
   for_ (abandonable (openAt open)) (`modify` fmap (IntMap.delete n))
   pure end
+
+-- | The beginning of the span has been reported. So now its end may be, also by another thread; if that
+-- was already to do it, this thread does.
+hasBegun :: Open -> IO ()
+hasBegun open = do
+  atomicWriteIORef (claimed open) False
+  isAbandoned <- any isNothing <$> traverse readIORef (abandonable (openAt open))
+  when isAbandoned (endSpan (StoppedBy WasAbandoned) open)
 
 -- | Registers an open span in the branches around it that may be abandoned. If one has been
 -- abandoned, the span's parent has ended: so its parent is unknown.
