@@ -6,6 +6,7 @@ import Control.Monad (forM_)
 import Data.Aeson hiding (pairs)
 import qualified Data.Aeson.KeyMap as KeyMap
 import Data.Aeson.Types (Parser, parseEither)
+import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Lazy as Bytes
 import Data.List (group, nub, sort, tails)
 import qualified Data.Map.Strict as Map
@@ -71,6 +72,8 @@ spec = do
     let spans = ended 1 Top "outer" 0 Nothing 1 Succeeded ++ concat [ended n (Inside 1) "inner" t Nothing t Succeeded | (n, t) <- [(2, 0), (3, 1), (4, 1)]]
     fmap (\s -> [(sName c, sBegin c, sEnd c) | c <- fst s]) (parsed (render spans))
       `shouldBe` Right [("outer", 0, 1000000.004), ("inner", 0.001, 0.002), ("inner", 1000000, 1000000.001), ("inner", 1000000.002, 1000000.003)]
+  it "has the arrow of a reaction without an escape, which a viewer shows" $
+    Bytes.toStrict (render mission) `shouldSatisfy` ("battery 9.4 (was 100) -> batteryLow" `Strict.isInfixOf`)
   it "has no numbers of spans among the arguments" . property $ \(Related events) ->
     fmap (nub . map sArguments . fst) (parsed (render events)) `elem` [Right [["outcome"]], Right []]
   it "is made of ten thousand spans at the same time, and of as many in each other" $ do

@@ -37,12 +37,14 @@ import Behavior.Trace.Recording
 renderTraceEvents :: Recording -> Lazy.ByteString
 renderTraceEvents r =
   toLazyByteString $
-    "{\"displayTimeUnit\":\"ms\",\"otherData\":" <> written (pairs (pair "lostEvents" (int (lost r))))
+    "{\"otherData\":" <> written (pairs (pair "lostEvents" (int (lost r))))
       <> ",\"traceEvents\":[\n"
-      <> mconcat (intersperse ",\n" (map written (process : map laneName lanes ++ map complete spans ++ flows r spans)))
+      <> mconcat (intersperse ",\n" (map event (process : map laneName lanes ++ map complete spans ++ flows r spans)))
       <> char7 '\n'
       <> "]}\n"
  where
+  -- Perfetto 52 shows the escapes of most texts as they are, and many texts contain an arrow.
+  event = writtenExcept ">"
   spans = apart (placed r)
   lanes = Set.toList (Set.fromList (map lane spans))
 
