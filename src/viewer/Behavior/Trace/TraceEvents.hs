@@ -29,7 +29,11 @@ import Behavior.Trace.Recording
 -- a flow leads to each span that the reaction started. Times are relative to the beginning of the
 -- recording.
 --
--- Viewers find out which spans are in which by times alone, and differ if two times are equal. So
+-- The second category of a span is its outcome. Why it failed or was stopped is the name of an
+-- instant event in it, at its end. A span has no arguments: speedscope makes them part of its name,
+-- and adds up the times of spans by their names.
+--
+-- Viewers find out by times alone which spans are in which, and differ if two times are equal. So
 -- each begin and end in a lane is later than the one before it, by a nanosecond if they were at the
 -- same time. In a simulated run many are.
 --
@@ -39,10 +43,11 @@ renderTraceEvents r =
   toLazyByteString $
     "{\"otherData\":" <> written (pairs (pair "lostEvents" (int (lost r))))
       <> ",\"traceEvents\":[\n"
-      <> mconcat (intersperse ",\n" (map event (process : map laneName lanes ++ map complete spans ++ flows r spans)))
+      <> mconcat (intersperse ",\n" (map event entries))
       <> char7 '\n'
       <> "]}\n"
  where
+  entries = process : map laneName lanes ++ map complete spans ++ flows r spans ++ concatMap why spans
   -- Perfetto 52 shows the escapes of most texts as they are, and many texts contain an arrow.
   event = writtenExcept ">"
   spans = apart (placed r)
@@ -170,12 +175,29 @@ complete p =
       <> pair "ts" (microseconds (begins p))
       <> pair "dur" (microseconds (ends p - begins p))
       <> pair "name" (text (nameText (spanName (nodeSpan (placedNode p)))))
-      <> pair "cat" (text (kind (spanKind (nodeSpan (placedNode p)))))
-      <> pair "args" (pairs (pair "outcome" (text (outcome (snd <$> nodeEnd (placedNode p))))))
+      <> pair "cat" (text (kind (spanKind (nodeSpan (placedNode p))) ++ "," ++ outcomeName (endOf p)))
  where
   kind Named = "named"
   kind Operator = "operator"
   kind Branch = "branch"
+
+-- In the span, just before its end: at its end, what follows hides the event.
+why :: Placed -> [Encoding]
+why p =
+  [ pairs $
+      pair "ph" (text "i")
+        <> pair "s" (text "t")
+        <> pair "pid" (int 1)
+        <> pair "tid" (int (lane p))
+        <> pair "ts" (microseconds (ends p - 1))
+        <> pair "name" (text reason)
+        <> pair "cat" (text "reason")
+  | let reason = outcome (endOf p)
+  , reason /= outcomeName (endOf p)
+  ]
+
+endOf :: Placed -> Maybe End
+endOf = fmap snd . nodeEnd . placedNode
 
 -- A flow needs both of its ends, each in a span, and the first one earlier. Of the spans that a
 -- reaction stopped, the outermost one is meant.
@@ -194,8 +216,8 @@ flows r spans = concat (zipWith flow [1 ..] interruptions)
   stoppedFirst =
     IntMap.fromListWith (\_ first -> first) [(n, p) | p <- spans, not (stoppedInside p), Just n <- [stoppedBy (placedNode p)]]
   -- When the operator decided. A viewer looks for the span in which the flow begins; at its very end
-  -- it finds none.
-  leaves n p = max (begins p) (min (ends p - 1) (IntMap.findWithDefault (ends p) n decided))
+  -- it finds none, and just before that the instant event.
+  leaves n p = max (begins p) (min (ends p - 2) (IntMap.findWithDefault (ends p) n decided))
   decided = IntMap.fromList [(reactionNumber x, nanoseconds (reactionTime x) - nanoseconds (from r)) | x <- reactions r]
   flow :: Int -> (Int, Placed, Placed, Integer) -> [Encoding]
   flow n (_, stopped, started, at) =
