@@ -7,6 +7,7 @@
 -- web page acts on, whatever the texts are.
 module Behavior.Trace.Json
   ( written
+  , writtenExcept
   , text
   , number
   ) where
@@ -23,13 +24,18 @@ import Numeric (showFFloat, showHex)
 -- | The bytes. Control characters, characters that change the direction of a text, and @<@, @>@
 -- and @&@ are written as escapes: outside of its texts, JSON contains none of them.
 written :: Encoding -> Builder
-written encoding
+written = writtenExcept ""
+
+-- | The same, except that these characters are written as they are.
+writtenExcept :: [Char] -> Encoding -> Builder
+writtenExcept plain encoding
   | Lazy.any unsafe characters = lazyByteString (Lazy.encodeUtf8 (Lazy.concatMap escaped characters))
   | otherwise = lazyByteString bytes
  where
   bytes = encodingToLazyByteString encoding
   characters = Lazy.decodeUtf8 bytes
   unsafe c
+    | c `elem` plain = False
     | c < '\DEL' = c < ' ' || c == '<' || c == '>' || c == '&'
     | otherwise = generalCategory c `elem` [Control, Format, LineSeparator, ParagraphSeparator]
   escaped c

@@ -29,17 +29,28 @@ import Behavior.Trace.Recording
 -- a flow leads to each span that the reaction started. Times are relative to the beginning of the
 -- recording.
 --
+-- The second category of a span is its outcome. Why it failed or was stopped is the name of an
+-- instant event in it, at its end. A span has no arguments: speedscope makes them part of its name,
+-- and adds up the times of spans by their names.
+--
+-- Viewers find out by times alone which spans are in which, and differ if two times are equal. So
+-- each begin and end in a lane is later than the one before it, by a nanosecond if they were at the
+-- same time. In a simulated run many are.
+--
 -- @since 0.1.0.0
 renderTraceEvents :: Recording -> Lazy.ByteString
 renderTraceEvents r =
   toLazyByteString $
-    "{\"displayTimeUnit\":\"ms\",\"otherData\":" <> written (pairs (pair "lostEvents" (int (lost r))))
+    "{\"otherData\":" <> written (pairs (pair "lostEvents" (int (lost r))))
       <> ",\"traceEvents\":[\n"
-      <> mconcat (intersperse ",\n" (map written (process : map laneName lanes ++ map complete spans ++ flows r spans)))
+      <> mconcat (intersperse ",\n" (map event entries))
       <> char7 '\n'
       <> "]}\n"
  where
-  spans = placed r
+  entries = process : map laneName lanes ++ map complete spans ++ flows r spans ++ concatMap why spans
+  -- Perfetto 52 shows the escapes of most texts as they are, and many texts contain an arrow.
+  event = writtenExcept ">"
+  spans = apart (placed r)
   lanes = Set.toList (Set.fromList (map lane spans))
 
 -- | A span in its lane. Its times are whole nanoseconds since the beginning of the recording.
@@ -50,6 +61,8 @@ data Placed = Placed
   , begins :: !Integer
   , ends :: !Integer
   , placedNode :: Node
+  , laidIn :: !(Maybe Int)
+  -- ^ The number of the innermost span that it is in, in its lane.
   , stoppedInside :: !Bool
   -- ^ The reaction that stopped it stopped its parent too.
   }
@@ -90,30 +103,45 @@ data Lanes = Lanes
 place :: Lanes -> Nested -> Lanes
 place lanes n =
   Lanes
-    { open = IntMap.insert chosen ((number', end) : around) (open lanes)
-    , freeAt = if null around then Set.insert (end, chosen) (forget (freeAt lanes)) else freeAt lanes
+    { open = IntMap.insert chosen ((number', end) : enclosing) (open lanes)
+    , freeAt = if null enclosing then Set.insert (end, chosen) (forget (freeAt lanes)) else freeAt lanes
     , laneOf = IntMap.insert number' chosen (laneOf lanes)
-    , placedSpans = Placed chosen begin end (nested n) inside : placedSpans lanes
+    , placedSpans = Placed chosen begin end (nested n) (fst <$> listToMaybe enclosing) inside : placedSpans lanes
     }
  where
   (begin, end) = interval n
   number' = spanNumber (nodeSpan (nested n))
   inside = maybe False ((== outsideStoppedBy n) . Just) (stoppedBy (nested n))
-  around = openIn chosen
-  chosen = case parentLane of
-    Just l | fits (openIn l) -> l
+  (chosen, enclosing) = case parentLane of
+    Just l | fits (openIn l) -> (l, openIn l)
     _ -> case Set.lookupMin (freeAt lanes) of
-      Just (time, l) | time <= begin -> l
-      _ -> IntMap.size (open lanes) + 1
+      Just (time, l) | time <= begin -> (l, [])
+      _ -> (IntMap.size (open lanes) + 1, [])
   parentLane = listToMaybe (outside n) >>= \parent -> IntMap.lookup parent (laneOf lanes)
-  openIn l = dropWhile ((<= begin) . snd) (IntMap.findWithDefault [] l (open lanes))
+  openIn l = dropWhile over (IntMap.findWithDefault [] l (open lanes))
+  -- What begins when the span that it ran in ends is in it.
+  over (m, mEnd) = mEnd < begin || mEnd == begin && (end > begin || m `notElem` outside n)
   -- In no other span than those that it really ran in.
   fits [] = True
-  fits ((enclosing, enclosingEnd) : _) = enclosing `elem` outside n && end <= enclosingEnd
+  fits ((m, mEnd) : _) = m `elem` outside n && end <= mEnd
   -- The lane is no longer free from when it was.
   forget free = case IntMap.lookup chosen (open lanes) of
     Just known | not (null known) -> Set.delete (snd (last known), chosen) free
     _ -> free
+
+-- | The same spans with times that tell which is in which: in each lane, no two times are equal.
+apart :: [Placed] -> [Placed]
+apart spans = sortOn begins (concatMap (go (-1) []) (IntMap.fromListWith (++) [(lane p, [p]) | p <- reverse spans]))
+ where
+  -- After the time of what was last, and inside of those that have begun and not ended.
+  go time outer (p : rest) | laidIn p == fmap number' (listToMaybe outer) = go begin (p {begins = begin} : outer) rest
+   where
+    begin = max (time + 1) (begins p)
+  go time (p : outer) rest = p {ends = end} : go end outer rest
+   where
+    end = max (time + 1) (ends p)
+  go _ [] _ = []
+  number' = spanNumber . nodeSpan . placedNode
 
 stoppedBy :: Node -> Maybe Int
 stoppedBy n = case nodeEnd n of
@@ -147,12 +175,29 @@ complete p =
       <> pair "ts" (microseconds (begins p))
       <> pair "dur" (microseconds (ends p - begins p))
       <> pair "name" (text (nameText (spanName (nodeSpan (placedNode p)))))
-      <> pair "cat" (text (kind (spanKind (nodeSpan (placedNode p)))))
-      <> pair "args" (pairs (pair "outcome" (text (outcome (snd <$> nodeEnd (placedNode p))))))
+      <> pair "cat" (text (kind (spanKind (nodeSpan (placedNode p))) ++ "," ++ outcomeName (endOf p)))
  where
   kind Named = "named"
   kind Operator = "operator"
   kind Branch = "branch"
+
+-- In the span, just before its end: at its end, what follows hides the event.
+why :: Placed -> [Encoding]
+why p =
+  [ pairs $
+      pair "ph" (text "i")
+        <> pair "s" (text "t")
+        <> pair "pid" (int 1)
+        <> pair "tid" (int (lane p))
+        <> pair "ts" (microseconds (ends p - 1))
+        <> pair "name" (text reason)
+        <> pair "cat" (text "reason")
+  | let reason = outcome (endOf p)
+  , reason /= outcomeName (endOf p)
+  ]
+
+endOf :: Placed -> Maybe End
+endOf = fmap snd . nodeEnd . placedNode
 
 -- A flow needs both of its ends, each in a span, and the first one earlier. Of the spans that a
 -- reaction stopped, the outermost one is meant.
@@ -171,8 +216,8 @@ flows r spans = concat (zipWith flow [1 ..] interruptions)
   stoppedFirst =
     IntMap.fromListWith (\_ first -> first) [(n, p) | p <- spans, not (stoppedInside p), Just n <- [stoppedBy (placedNode p)]]
   -- When the operator decided. A viewer looks for the span in which the flow begins; at its very end
-  -- it finds none.
-  leaves n p = max (begins p) (min (ends p - 1) (IntMap.findWithDefault (ends p) n decided))
+  -- it finds none, and just before that the instant event.
+  leaves n p = max (begins p) (min (ends p - 2) (IntMap.findWithDefault (ends p) n decided))
   decided = IntMap.fromList [(reactionNumber x, nanoseconds (reactionTime x) - nanoseconds (from r)) | x <- reactions r]
   flow :: Int -> (Int, Placed, Placed, Integer) -> [Encoding]
   flow n (_, stopped, started, at) =
