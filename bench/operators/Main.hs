@@ -22,7 +22,7 @@ import Behavior
 import Behavior.Parallel (allOf, decide, firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically)
-import Behavior.Trace (Sink (..), named, withTrace)
+import Behavior.Trace (Sink (..), TraceOptions (..), defaultTraceOptions, named, withTrace, withTraceOptions)
 import Measured
 
 main :: IO ()
@@ -90,6 +90,10 @@ tracing setting =
   [ each (setting ++ " no name") 4000000 succeeds
   , each (setting ++ " named") 4000000 (named "span" succeeds)
   , traced "named" 50000 (named "span" succeeds)
+  , Case (setting ++ " traced named, the sink blocked") 50000 $ \n -> do
+      gate <- newEmptyMVar
+      withTraceOptions defaultTraceOptions {waitAtEnd = 0} [EachEvent (\_ -> takeMVar gate)] (replicateM_ n (named "span" succeeds))
+      putMVar gate ()
   , Case (setting ++ " traced named, by two") 50000 $ \n ->
       inTrace (both (replicateM_ (n `div` 2) (named "span" succeeds)) (replicateM_ (n `div` 2) (named "span" succeeds)))
   , each (setting ++ " parallel") 10000 (parallel succeeds succeeds)

@@ -77,6 +77,7 @@ traces =
     concat
       [ [ at n "named" `beside` at n "no name"
         , at n "traced named" `atMost` 2 * microseconds
+        , at n "traced named, the sink blocked" `within` 1.05 `times` at n "traced named"
         , at n "traced named, by two" `atMost` 2 * microseconds
         , at n "traced parallel" `beside` at n "parallel"
         , at n "traced monitor" `beside` at n "monitor"
