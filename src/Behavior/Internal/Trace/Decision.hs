@@ -51,6 +51,7 @@ data Decision = Decision
   { cause :: Cause
   -- ^ Why what is stopped now is stopped.
   , decidedOn :: Values
+  -- ^ The values when it decided.
   , unreported :: !(Maybe Unreported)
   -- ^ Nothing without a trace, and if it is no reaction to a change of a signal.
   }
