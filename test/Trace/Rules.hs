@@ -297,8 +297,8 @@ causes x =
           (op, _) | op `notElem` ["parallel", "firstOf", "both", "allOf", "decide", "scoped", "withShared"] -> case cause of
             SignalChanged n these -> maybe False (\(_, r) -> reactionParent r == Inside (spanNumber o) && reactionOperator r == op && reactionChanges r == these) (Map.lookup n (reacted x))
             SiblingFinished n -> not (null (finishedNow n))
-            -- Nothing runs after the failure of a sensor. (What had been started may begin, and is stopped.)
-            SiblingFailed "sensor" | op /= "timeout" && null [() | (at, _, b) <- Map.elems (begun x), spanParent b == Inside (spanNumber o), not (isWorker (spanName b)), at > endOf', maybe True (\(_, _, _, _, e) -> not (isStopped e)) (Map.lookup (spanNumber b) (over x))] -> operatorEnd /= Just Succeeded || any (\(_, _, e) -> e == Succeeded) (siblings o)
+            -- Nothing begins after the failure of a sensor. (What had been started begins at the same time, and may even end by itself.)
+            SiblingFailed "sensor" | op /= "timeout" && null [() | (_, _, b) <- Map.elems (begun x), spanParent b == Inside (spanNumber o), not (isWorker (spanName b)), any (realToFrac (spanBegan b) >) (Map.lookup endOf' times)] -> operatorEnd /= Just Succeeded || any (\(_, _, e) -> e == Succeeded) (siblings o)
             SiblingFailed n -> not (null (failedNow n))
             _ -> False
           _ -> False
