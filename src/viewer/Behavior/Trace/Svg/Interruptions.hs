@@ -166,7 +166,7 @@ rowsFor left right names markers = map final chosen
   changesOf r = inertUpTo 120 (intercalate " → " (fst (partsOf r)))
   partsOf r = uncurry reactionParts (names r) r
   long r = arrows (snd (partsOf r))
-  short r = arrows (foldMap (pure . stoppedText (map fst (fst (names r)))) (reactionStopped r) ++ foldMap (pure . startedText (snd (names r))) (reactionStarts r))
+  short r = arrows (foldMap (pure . stoppedText (map fst (fst (names r)))) (reactionStopped r) ++ startsText (snd (names r)) r)
   arrows = unwords . map ("→ " ++)
 
 diamond :: Double -> Double -> Text
