@@ -8,10 +8,6 @@ module Behavior.Trace.Svg
 
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (sortOn)
-import qualified Data.Map.Strict as Map
-import Data.Maybe (isJust)
-import Data.Ord (Down (..))
 import qualified Data.Text as Text
 import qualified Data.Text.Lazy as Lazy
 import Graphics.Svg.Core (Element)
@@ -22,6 +18,7 @@ import Behavior.Trace
 import Behavior.Trace.Describe hiding (outcome)
 import Behavior.Trace.Recording
 import Behavior.Trace.Svg.Draw
+import Behavior.Trace.Svg.Header
 import Behavior.Trace.Svg.Interruptions
 import Behavior.Trace.Svg.Labels
 import Behavior.Trace.Svg.Layout
@@ -39,10 +36,10 @@ timeline r =
   document
     width
     (bottom + margin)
-    heading
+    (titleText r)
     [ shape "g" (Text.concat ["M0 0H", px width, "V", px (bottom + margin), "H0Z"])
-    , textAt "t" margin 34 [("", fitted (width / 1.9 - textWidth missing) heading), ("w", missing)]
-    , textAt "" margin 56 [("q", "most of the time:"), ("", fitted 1000 (whereTimeWent r))]
+    , textAt "t" margin 34 (title (width - 2 * margin) r)
+    , textAt "" margin 56 (whereTimeWent (width - 2 * margin) r)
     , legend (any isMerged drawn)
     , group "ax" (concatMap tick (ticks (fromSeconds total)))
     , group "" (map (bar (if null (drop 200 drawn) then 300 else 60) y barHeight r stopRequests) drawn)
@@ -71,14 +68,6 @@ timeline r =
    where
     x' = x . (from r +) . realToFrac
   stopRequests = IntMap.fromList [(reactionNumber a, x (reactionTime a)) | a <- reactions r]
-  heading = concat
-    [ case roots r of
-        [n] -> inertUpTo 60 (nameText (spanName (nodeSpan n))) ++ ": "
-        _ -> ""
-    , secondsText total
-    , concatMap (", " ++) (summary r)
-    ]
-  missing = if lost r > 0 then lostText (lost r) else ""
 
 width, margin, axisTop, bandTop :: Double
 width = 1200
@@ -88,40 +77,6 @@ bandTop = 128
 
 fromSeconds :: Seconds -> Double
 fromSeconds = realToFrac
-
-summary :: Recording -> [String]
-summary r =
-  [some spans "span"]
-    ++ [some interruptions "interruption" | interruptions > 0]
-    ++ [show n ++ what | (n, what) <- [(count Failure, " failed"), (count Fault, " faulted"), (count Running, " not ended")], n > 0]
- where
-  spans = length (nodes r)
-  interruptions = length (filter (isJust . reactionStopped) (reactions r))
-  count o = length (filter ((o ==) . outcomeOf) (nodes r))
-
--- The names whose spans took most of the time, not counting the time in which a span inside ran.
-whereTimeWent :: Recording -> String
-whereTimeWent r = commas (map entry (take 4 (filter ((> 0) . snd) (sortOn (Down . snd) (Map.toList times)))))
- where
-  times = Map.fromListWith (+) [(inertUpTo 40 (nameText (spanName (nodeSpan n))), own n) | n <- nodes r]
-  entry (name, t) = name ++ " " ++ secondsText t ++ percent t
-  percent t
-    | total > 0, t <= total = " (" ++ show (round (100 * t / total) :: Int) ++ " %)"
-    | otherwise = ""
-  total = until r - from r
-  commas [] = "nothing took time"
-  commas texts = foldr1 (\a b -> a ++ ",  " ++ b) texts
-  own n = max 0 (end - begin - covered begin [interval c | c <- sortOn (spanBegan . nodeSpan) (nodeChildren n)])
-   where
-    (begin, end) = interval n
-    covered _ [] = 0
-    covered done ((a, b) : rest)
-      | b' > a' = (b' - a') + covered b' rest
-      | otherwise = covered done rest
-     where
-      a' = max a done
-      b' = min b end
-  interval n = (spanBegan (nodeSpan n), nodeUntil r n)
 
 -- Round steps, about ten of them.
 ticks :: Double -> [(Double, String)]

@@ -201,7 +201,7 @@ style :: Text
 style =
   Text.concat
     [ ".bt text{font:12px system-ui,-apple-system,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}"
-    , ".bt .t{font-size:18px;font-weight:600}"
+    , ".bt .t{font-size:18px;font-weight:600}.bt .tr{font-size:14px;font-weight:400}"
     , ".bt .b{stroke-width:1}.bt .m{stroke:none}.bt .ar{fill:none;stroke-width:1.6;stroke-linejoin:round}"
     , ".bt .ha{fill:none;stroke-width:4.5;opacity:.85}.bt .thin .ar{stroke-width:.8;opacity:.7}"
     , ".bt .r{stroke-dasharray:4 3}.bt .e{text-anchor:end}.bt .c{text-anchor:middle}"
