@@ -45,6 +45,45 @@ spec = do
       let shares = [read (reverse (takeWhile isDigit (reverse known))) :: Int | (known, rest) <- splits (whereMost (map renamed events)), " %" `isPrefixOf` rest]
        in counterexample (show shares) (length shares <= 4 && all (<= 100) shares)
 
+  describe "explains" $ do
+    it "the marks that it contains" $ do
+      legend watering `shouldBe` ["succeeded", "stopped", "a signal changed → stopped → started", "a signal changed → started"]
+      legend mission
+        `shouldBe` ["succeeded", "failed", "faulted", "stopped", "while stopping", "not ended", "a signal changed → stopped → started", "a signal changed → started"]
+      legend (mixed 10000) `shouldBe` ["succeeded", "failed", "faulted", "stopped", "short spans, together"]
+    it "no others" $ do
+      legend (ended 1 Top "a" 0 Nothing 1 Succeeded) `shouldBe` ["succeeded"]
+      legend (interrupted 3) `shouldBe` ["stopped", "while stopping", "a signal changed → stopped → started"]
+      legend [] `shouldBe` []
+
+  describe "has another mark for a change that interrupted nothing" $ do
+    it "than for one that interrupted something" $
+      [(attribute "class" e, take 10 (textOf e)) | e <- allOf "path" (drawn watering), attribute "class" e `elem` ["i", "io"], not (null (textOf e))]
+        `shouldBe` [("i", "battery 18"), ("io", "battery 10")]
+    it "and says what starts, if need be without the values before" $
+      texts (drawn watering) `shouldSatisfy` elem "battery 100 → batteryLow False→ starts \"water\""
+
+  describe "shows texts whole, if there is room" $ do
+    it "a failure on two lines" $
+      texts (drawn doors) `shouldSatisfy` (\known -> all (`elem` known) ["failed: the front", "door is locked"])
+    it "a failure that reaches below the next bar" $
+      texts (drawn (locked ++ ended 8 (Inside 1) "rest" 2 Nothing 10 Succeeded)) `shouldSatisfy` elem "failed: the back door is locked"
+    it "a name on two lines" $
+      texts (drawn doors) `shouldSatisfy` (\known -> all (`elem` known) ["front door", "smash", "back door"])
+    it "and nothing of them is cut off" $
+      [t | t <- texts (drawn doors), '…' `elem` t] `shouldBe` []
+    it "a lane is higher, if texts below it have two lines" $
+      attributeOf "height" (drawn doors) - attributeOf "height" (drawn (map withoutReason doors)) `shouldBe` 13
+
+  it "has a line to each text that is outside of its bar" $ do
+    let events = ended 1 Top "mission" 0 Nothing 100 Succeeded ++ ended 2 (Inside 1) "photograph" 50 Nothing 51 Succeeded
+        ends = [d | e <- allOf "path" (drawn events), attribute "class" e == "ld", let d = attribute "d" e]
+        left = [x | t <- allOf "text" (drawn events), "photograph" `isPrefixOf` textOf t, x <- [attributeOf "x" t]]
+    length ends `shouldBe` 1
+    -- From 51 % of the width to the text.
+    (takeWhile (/= ' ') (drop 1 (head ends)), reverse (takeWhile (/= 'H') (reverse (head ends)))) `shouldBe` ("611.4", "622.4")
+    left `shouldBe` [625.4]
+
 drawn :: [Event] -> Xml
 drawn events = either error id (readXml (Lazy.unpack (timeline (recording events))))
 
@@ -62,6 +101,14 @@ whereMost events = head [drop (length begin) t | t <- texts (drawn events), begi
  where
   begin = "most of the time:"
 
+legend :: [Event] -> [String]
+legend events = [textOf t | g <- allOf "g" (drawn events), attribute "class" g == "le", t <- allOf "text" g]
+
+attributeOf :: String -> Xml -> Double
+attributeOf name x = read (if '.' `elem` text then text else text ++ ".0")
+ where
+  text = attribute name x
+
 splits :: String -> [(String, String)]
 splits text = [splitAt k text | k <- [0 .. length text]]
 
@@ -73,6 +120,11 @@ renamed event = case event of
   _ -> event
  where
   short s = s {spanName = ["ab" !! (spanNumber s `mod` 2)]}
+
+withoutReason :: Event -> Event
+withoutReason event = case event of
+  Ended s t (FailedWith _) -> Ended s t (FailedWith "")
+  _ -> event
 
 isInterruption :: Event -> Bool
 isInterruption event = case event of
@@ -96,3 +148,20 @@ watering =
   changes = [Change "battery" (Just "50") "18", Change "batteryLow" (Just "False") "True"]
   bed :: Int -> Int -> Int -> Seconds -> [Event]
   bed n parent k begin = ended n (Inside parent) ("water bed " ++ show k) begin Nothing (begin + 4.5) Succeeded
+
+-- Doors are locked; the robot is interrupted when it smashes one.
+doors :: [Event]
+doors =
+  locked
+    ++ ended 4 (Inside 1) "smash back door" 2 Nothing 2.55 (StoppedBy low)
+    ++ [Reacted (Reaction 5 (Inside 1) "monitor" 2.55 changes (Just (StoppedBranch "task" 2.55 0 (StoppedBy low))) (Just "recovery"))]
+    ++ ended 6 (Inside 1) "recharge" 2.55 (Just 5) 4.5 Succeeded
+ where
+  low = SignalChanged 5 changes
+  changes = [Change "battery" (Just "10") "9"]
+
+locked :: [Event]
+locked =
+  ended 1 Top "mission" 0 Nothing 10 Succeeded
+    ++ ended 2 (Inside 1) "open front door" 0 Nothing 1 (FailedWith "the front door is locked")
+    ++ ended 3 (Inside 1) "open back door" 1 Nothing 2 (FailedWith "the back door is locked")
