@@ -6,6 +6,7 @@ import qualified Viewer.DiffSpec
 import qualified Viewer.FileSpec
 import qualified Viewer.FormatSpec
 import qualified Viewer.InterruptionSpec
+import qualified Viewer.PictureSpec
 import qualified Viewer.PlainLinesSpec
 import qualified Viewer.SummarySpec
 import qualified Viewer.SvgSpec
@@ -24,7 +25,9 @@ main = hspec $ do
   describe "An event as a line of text" Viewer.PlainLinesSpec.spec
   describe "The tree" Viewer.TreeSpec.spec
   describe "The tree in the terminal" Viewer.TerminalSpec.spec
-  describe "The timeline" Viewer.SvgSpec.spec
+  describe "The timeline" $ do
+    Viewer.SvgSpec.spec
+    Viewer.PictureSpec.spec
   describe "An interruption" Viewer.InterruptionSpec.spec
   describe "The summary" Viewer.SummarySpec.spec
   describe "The differences" Viewer.DiffSpec.spec

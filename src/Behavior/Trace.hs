@@ -28,10 +28,10 @@
 -- 0.000 + mission
 -- 0.000 + drive
 -- 3.000 - drive: stopped after 3 s: battery 9 (was 100) -> battery low True (was False)
--- 3.000 ! battery 9 (was 100) -> battery low True (was False) -> stopped its task after 3 s (took 0 s) -> recovery
+-- 3.000 ! battery 9 (was 100) -> battery low True (was False) -> stopped its task after 3 s -> recovery
 -- 3.000 + recharge
 -- 5.000 - recharge: succeeded after 2 s
--- 5.000 ! battery 100 (was 9) -> battery low False (was True) -> task
+-- 5.000 ! battery 100 (was 9) -> battery low False (was True) -> starts task
 -- 5.000 + drive
 -- 9.000 - drive: succeeded after 4 s
 -- 9.000 - mission: succeeded after 9 s

@@ -43,6 +43,17 @@ spec = do
     inTerminal (stoppedAt 60 [57, 55]) `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
   it "has no negative time, if a span began while its branch was stopped" $
     inTree (stoppedAt 60 [60.1]) `shouldSatisfy` any ("stopped \"robot 1\" after 0 s (took" `isInfixOf`)
+  it "says how long stopping took only if it took a time" $ do
+    let atOnce took end = [if isReaction e then reactionThat (Just (StoppedBranch "task" 3.1 took end)) else e | e <- patrol]
+        words' = "battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s -> \"recharge\""
+    map (\took -> inTree (atOnce took (low 4))) [0, 0.00001] `shouldBe` [[words'], [words']]
+    inTerminal (atOnce 0 (low 4)) `shouldBe` ["battery 9.4 -> batteryLow True", "stopped \"drive\" after 3.1 s -> \"recharge\""]
+    inTimeline (atOnce 0 (low 4)) `shouldBe` [words']
+    inTree (atOnce 0 Succeeded) `shouldSatisfy` any ("after 3.1 s (it completed nevertheless) ->" `isInfixOf`)
+  it "says what starts, if nothing was stopped" $ do
+    let events = [if isReaction e then reactionThat Nothing else e | e <- patrol]
+    inTree events `shouldBe` ["battery 9.4 -> batteryLow True -> starts \"recharge\""]
+    [t | t <- timelineTexts events, "starts" `isInfixOf` t] `shouldBe` ["battery 9.4 -> batteryLow True -> starts \"recharge\""]
   it "has the names of all spans that were stopped, up to three" $ do
     inTree (several 3) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" after" `isInfixOf`)
     inTree (several 5) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
@@ -73,10 +84,13 @@ inTerminal events = case dropWhile ((/= "◆ ") . take 2) (map plain (treeLines 
 
 -- The label beside the marker; the arrow is another character there.
 inTimeline :: [Event] -> [String]
-inTimeline events =
+inTimeline events = [text | text <- timelineTexts events, "-> stopped " `isInfixOf` text]
+
+-- The texts of two parts.
+timelineTexts :: [Event] -> [String]
+timelineTexts events =
   [ concatMap (\c -> if c == '→' then "->" else [c]) (unwords [textOf p | p <- parts])
-  | text@(Element "text" _ parts) <- either error everything (readXml (Text.unpack (timeline (recording events))))
-  , "stopped " `isInfixOf` textOf text
+  | Element "text" _ parts <- either error everything (readXml (Text.unpack (timeline (recording events))))
   , length parts == 2
   ]
 
@@ -92,6 +106,14 @@ reaction = reactionAt 3.1
 -- It stops a branch that began at 0.
 reactionAt :: Seconds -> Event
 reactionAt t = Reacted (Reaction 4 (Inside 1) "monitor" t changes (Just (StoppedBranch "task" t 0.3 (low 4))) (Just "recovery"))
+
+reactionThat :: Maybe StoppedBranch -> Event
+reactionThat stopped = Reacted (Reaction 4 (Inside 1) "monitor" 3.1 changes stopped (Just "recovery"))
+
+isReaction :: Event -> Bool
+isReaction event = case event of
+  Reacted _ -> True
+  _ -> False
 
 -- A span is stopped with one in it; another one is started.
 patrol :: [Event]

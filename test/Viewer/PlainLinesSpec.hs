@@ -17,7 +17,7 @@ spec = do
   it "has the cause of an interruption with its values, what was stopped, and what starts" $
     map plainLine (filter isReaction mission)
       `shouldBe` [ "9.100 ! battery 9.4 (was 100) -> batteryLow True (was False) -> stopped its task after 3.1 s (took 0.3 s) -> recovery"
-                 , "28.000 ! batteryLow False (was True) -> task"
+                 , "28.000 ! batteryLow False (was True) -> starts task"
                  ]
 
   it "says how a branch ended that was to be stopped" $ do

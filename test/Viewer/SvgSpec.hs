@@ -80,6 +80,7 @@ spec = do
   describe "draws an interruption from the signal's change to what was stopped, and on to what was started" $ do
     it "in a mission" $ once (arrowsComplete mission)
     prop "in any number of rounds" $ forAll (choose (2, 30)) (arrowsComplete . interrupted)
+    it "with arrows that do not touch" $ once (arrowsApart (interrupted 60))
     it "and has no other arrows" $ do
       length (reactionsOf mission) `shouldBe` 2
       length (arrowsOf (drawn mission)) `shouldBe` 3
@@ -106,22 +107,25 @@ arrowsComplete events = conjoin (map complete (reactionsOf events))
   complete r =
     counterexample (show r) $
       conjoin
-        [ counterexample "no arrow from the marker" (any (\b -> any (fromMarkerTo b) arrows) (if null stopped then started else stopped))
+        [ counterexample "no arrow from the marker" (any (\b -> any (fromMarkerTo (not (null stopped)) b) arrows) (if null stopped then started else stopped))
         , counterexample "no arrow to what was started" $
             null stopped || null started || or [on s a && onEdge t b | s <- stopped, t <- started, (a, b) <- arrows]
         ]
    where
     stopped = [b | n <- nodes known, Just (_, StoppedBy (SignalChanged k _)) <- [nodeEnd n], k == reactionNumber r, b <- boxOf n]
     started = [b | n <- nodes known, spanReaction (nodeSpan n) == Just (reactionNumber r), b <- boxOf n]
-  fromMarkerTo (left, right, top, _) ((x, y), (x', y')) =
-    near x x' && near y' top && x' >= left - 0.2 && x' <= right + 0.2 && any (\(dx, dy) -> near dx x && abs (dy - y) < 8) markers
+  -- To a place where it is clear which bar it is.
+  fromMarkerTo isStopped (left, right, top, _) ((x, y), (x', y')) =
+    abs (x - x') < 12 && near y' top && x' >= left + inside (not isStopped) - 0.6 && x' <= right - inside isStopped + 0.6 && any (\(dx, dy) -> near dx x && abs (dy - y) < 8) markers
+   where
+    inside there = if there then min 8 ((right - left) / 3) else 0
   on (left, right, _, bottom) (x, y) = near y bottom && x >= left - 0.2 && x <= right + 0.2
   onEdge (left, right, top, bottom) (x, y) = x >= left - 0.2 && x <= right + 0.2 && y >= top - 0.2 && y <= bottom + 0.2
   near a b = abs (a - b) < 0.2
   known = recording events
   picture = drawn events
   arrows = arrowsOf picture
-  markers = [(x + 6, y) | e@(Element "path" _ (_ : _)) <- everything picture, attribute "class" e == "i", x : y : _ <- [numbers (attribute "d" e)]]
+  markers = [(x + 6, y) | e@(Element "path" _ (_ : _)) <- everything picture, attribute "class" e `elem` ["i", "io"], x : y : _ <- [numbers (attribute "d" e)]]
   boxOf n = [box m | m <- bars picture, name : more <- [lines (textOf m)], name == spanName s, ("from " ++ secondsText (spanBegan s - from known)) `elem` more]
    where
     s = nodeSpan n
@@ -129,16 +133,21 @@ arrowsComplete events = conjoin (map complete (reactionsOf events))
    where
     (xs, ys) = outline (attribute "d" m)
 
+-- Of the arrows from one bar to the next, none begins or ends where another one does.
+arrowsApart :: [Event] -> Property
+arrowsApart events = counterexample (show xs) (length xs > 50 && and (zipWith (<) xs (drop 1 xs)))
+ where
+  xs = concat [[x, x'] | ((x, y), (x', y')) <- arrowsOf (drawn events), y == y']
+
 reactionsOf :: [Event] -> [Reaction]
 reactionsOf = reactions . recording
 
--- Where the arrows begin and end. The two strokes of the head belong to each.
+-- Where the arrows begin and end, without those of the legend. The two strokes of the head belong to each.
 arrowsOf :: Xml -> [((Double, Double), (Double, Double))]
 arrowsOf x = concatMap ends [attribute "d" a | Element "g" _ inner <- everything x, a@(Element "path" _ _) <- inner, attribute "class" a == "ar"]
  where
-  ends d = case (filter (`elem` "MVCml") d, numbers d) of
-    ("MVml", [x0, y0, y, _, _, _, _, _, _]) -> [((x0, y0), (x0, y))]
-    ("MCml", [x0, y0, _, _, _, _, x1, y1, _, _, _, _, _, _]) -> [((x0, y0), (x1, y1))]
+  ends d = case outline (takeWhile (/= 'm') d) of
+    (xs@(_ : _ : _), ys) | any (`elem` d) "VC" -> [((head xs, head ys), (last xs, last ys))]
     _ -> []
 
 svg :: [Event] -> String
@@ -149,7 +158,7 @@ drawn events = either error id (readXml (svg events))
 
 -- The shapes of spans: those that have a title and are no markers.
 bars :: Xml -> [Xml]
-bars x = [e | e@(Element "path" _ inner) <- everything x, attribute "class" e /= "i", not (null [() | Element "title" _ _ <- inner])]
+bars x = [e | e@(Element "path" _ inner) <- everything x, attribute "class" e `notElem` ["i", "io"], not (null [() | Element "title" _ _ <- inner])]
 
 textsOf :: Xml -> [String]
 textsOf x = [textOf t | t@(Element "text" _ _) <- everything x]
@@ -192,6 +201,8 @@ outline = go (0, 0)
     'h' : rest | ([a], rest') <- arguments 1 rest -> at (x + a, y) rest'
     'v' : rest | ([b], rest') <- arguments 1 rest -> at (x, y + b) rest'
     'l' : rest | ([a, b], rest') <- arguments 2 rest -> at (x + a, y + b) rest'
+    'L' : rest | ([a, b], rest') <- arguments 2 rest -> at (a, b) rest'
+    'C' : rest | ([_, _, _, _, a, b], rest') <- arguments 6 rest -> at (a, b) rest'
     'q' : rest | ([_, _, a, b], rest') <- arguments 4 rest -> at (x + a, y + b) rest'
     'Z' : rest -> go (x, y) rest
     _ -> ([], [])

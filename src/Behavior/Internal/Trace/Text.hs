@@ -14,6 +14,7 @@ module Behavior.Internal.Trace.Text
   , reactionParts
   , stoppedText
   , startedText
+  , startsText
   , changesText
   , endText
   , howText
@@ -84,18 +85,27 @@ reactionText spans started r = intercalate " -> " (changed ++ done)
 -- "stopped \"drive\" after 2.1 s, \"film\" after 1.1 s (took 0.3 s)"
 -- >>> fst (reactionParts [] Nothing reaction {reactionChanges = []})
 -- ["monitor changed"]
+-- >>> snd (reactionParts [] Nothing reaction {reactionStopped = Nothing})
+-- ["starts recovery"]
+--
+-- How long stopping took is left out if it took no time: less than half a millisecond.
+--
+-- >>> snd (reactionParts [] Nothing reaction {reactionStopped = Just stopped {stoppingTook = 0}})
+-- ["stopped its task after 3.1 s","recovery"]
 reactionParts :: [(String, Seconds)] -> Maybe String -> Reaction -> ([String], [String])
-reactionParts spans started r = (changed, maybe [] stopped (reactionStopped r) ++ starts)
+reactionParts spans started r = (changed, maybe [] stopped (reactionStopped r) ++ startsText started r)
  where
   changed = case reactionChanges r of
     [] -> [nameText (reactionOperator r) ++ " changed"]
     changes -> map changeText changes
   stopped b = [stoppedAfterText spans (reactionTime r) b ++ took b]
-  took b = " (took " ++ secondsText (stoppingTook b) ++ although (stoppedEnd b) ++ ")"
-  although Succeeded = ", it completed nevertheless"
-  although (StoppedBy _) = ""
-  although end = ", it " ++ howText end
-  starts = [startedText started branch | Just branch <- [reactionStarts r]]
+  took b = case stoppingTime (stoppingTook b) ++ although (stoppedEnd b) of
+    [] -> ""
+    remarks -> " (" ++ intercalate ", " remarks ++ ")"
+  stoppingTime t = ["took " ++ secondsText t | milliseconds t /= milliseconds 0]
+  although Succeeded = ["it completed nevertheless"]
+  although (StoppedBy _) = []
+  although end = ["it " ++ howText end]
 
 -- | What was stopped, given the names of the spans.
 --
@@ -125,6 +135,10 @@ upToThree texts = intercalate ", " known ++ concat [" and " ++ show (length more
 -- | What was started, given the name of the span, if there is one, and that of the branch.
 startedText :: Maybe String -> String -> String
 startedText started branch = maybe (nameText branch) quoted started
+
+-- | The same after what was stopped. If nothing was stopped, it says that this is what starts.
+startsText :: Maybe String -> Reaction -> [String]
+startsText started r = [maybe "starts " (const "") (reactionStopped r) ++ startedText started branch | Just branch <- [reactionStarts r]]
 
 -- | The named values after a change, those that others are computed from first.
 --

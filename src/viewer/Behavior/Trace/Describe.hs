@@ -24,6 +24,7 @@ module Behavior.Trace.Describe
   , reactionParts
   , stoppedText
   , startedText
+  , startsText
   , lostText
   , lostRemark
   ) where

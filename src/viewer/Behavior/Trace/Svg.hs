@@ -8,10 +8,8 @@ module Behavior.Trace.Svg
 
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (sortOn)
-import qualified Data.Map.Strict as Map
-import Data.Maybe (isJust)
-import Data.Ord (Down (..))
+import qualified Data.IntSet as IntSet
+import Data.Maybe (fromMaybe, isJust)
 import qualified Data.Text as Text
 import qualified Data.Text.Lazy as Lazy
 import Graphics.Svg.Core (Element)
@@ -22,13 +20,16 @@ import Behavior.Trace
 import Behavior.Trace.Describe hiding (outcome)
 import Behavior.Trace.Recording
 import Behavior.Trace.Svg.Draw
+import Behavior.Trace.Svg.Header
 import Behavior.Trace.Svg.Interruptions
 import Behavior.Trace.Svg.Labels
 import Behavior.Trace.Svg.Layout
+import Behavior.Trace.Svg.Legend
 
 -- | The recording as an SVG file: the time from left to right, each span as a bar below the one
 -- that it runs in. The colour and the right end of a bar say how it ended. An interruption is an
--- arrow from the change of the signal to what was stopped, and on to what was started.
+-- arrow from the change of the signal to what was stopped, and on to what was started. The mark of a change that stopped
+-- nothing is hollow. At the top: how it ended, where most of the time went, and what the marks mean that occur.
 --
 -- The file needs no other file and contains no script. Its text is ASCII. Spans too narrow to be
 -- seen are drawn together; what failed, faulted or was stopped is always visible.
@@ -39,15 +40,15 @@ timeline r =
   document
     width
     (bottom + margin)
-    heading
+    (titleText r)
     [ shape "g" (Text.concat ["M0 0H", px width, "V", px (bottom + margin), "H0Z"])
-    , textAt "t" margin 34 [("", fitted (width / 1.9 - textWidth missing) heading), ("w", missing)]
-    , textAt "" margin 56 [("q", "most of the time:"), ("", fitted 1000 (whereTimeWent r))]
-    , legend (any isMerged drawn)
+    , textAt "t" margin 34 (title (width - 2 * margin) r)
+    , textAt "" margin 56 (whereTimeWent (width - 2 * margin) r)
+    , legend margin used
     , group "ax" (concatMap tick (ticks (fromSeconds total)))
     , group "" (map (bar (if null (drop 200 drawn) then 300 else 60) y barHeight r stopRequests) drawn)
     , interruptionArrows interruptions
-    , group "l" (labels (gap > 10) (width - 4) y barHeight drawn)
+    , group "l" (concat [labelDrawn l (y (labelLane l)) | l <- texts])
     , interruptionLabels interruptions
     ]
  where
@@ -55,9 +56,20 @@ timeline r =
   drawn = marks 800 placed
   lanes = if null placed then 1 else 1 + maximum (map placedLane placed)
   (barHeight, gap) = if lanes <= 16 then (24, 16) else (16, 7)
-  interruptions = layInterruptions margin (width - margin) bandTop barHeight x y placed r
-  lanesTop = interruptionsBottom interruptions + 14
-  y lane = lanesTop + fromIntegral lane * (barHeight + gap)
+  interruptions = layInterruptions margin (width - margin) bandTop (barHeight, gap) x y placed r
+  texts = labels (gap > 10) (width - 4) barHeight (interruptionsBelow interruptions) drawn
+  used =
+    Used
+      { usedOutcomes = map markOutcome drawn
+      , usedStopping = any (isJust . stoppingFrom stopRequests) drawn
+      , usedChanges = interruptionEffects interruptions
+      , usedMerged = any isMerged drawn
+      }
+  -- A lane with two lines of text below its bars is higher.
+  y lane = fromMaybe 0 (IntMap.lookup lane tops)
+  tops = IntMap.fromList (zip [0 .. lanes] (scanl (+) (interruptionsBottom interruptions + 14) (map height [0 ..])))
+  height lane = barHeight + gap + (if IntSet.member lane higher then 13 else 0)
+  higher = IntSet.fromList [labelLane l | l <- texts, labelLinesBelow l > 1]
   bottom = y lanes
   total = until r - from r
   x t = margin + (width - 2 * margin) * max 0 (min 1 (share t))
@@ -71,14 +83,6 @@ timeline r =
    where
     x' = x . (from r +) . realToFrac
   stopRequests = IntMap.fromList [(reactionNumber a, x (reactionTime a)) | a <- reactions r]
-  heading = concat
-    [ case roots r of
-        [n] -> inertUpTo 60 (nameText (spanName (nodeSpan n))) ++ ": "
-        _ -> ""
-    , secondsText total
-    , concatMap (", " ++) (summary r)
-    ]
-  missing = if lost r > 0 then lostText (lost r) else ""
 
 width, margin, axisTop, bandTop :: Double
 width = 1200
@@ -88,40 +92,6 @@ bandTop = 128
 
 fromSeconds :: Seconds -> Double
 fromSeconds = realToFrac
-
-summary :: Recording -> [String]
-summary r =
-  [some spans "span"]
-    ++ [some interruptions "interruption" | interruptions > 0]
-    ++ [show n ++ what | (n, what) <- [(count Failure, " failed"), (count Fault, " faulted"), (count Running, " not ended")], n > 0]
- where
-  spans = length (nodes r)
-  interruptions = length (filter (isJust . reactionStopped) (reactions r))
-  count o = length (filter ((o ==) . outcomeOf) (nodes r))
-
--- The names whose spans took most of the time, not counting the time in which a span inside ran.
-whereTimeWent :: Recording -> String
-whereTimeWent r = commas (map entry (take 4 (filter ((> 0) . snd) (sortOn (Down . snd) (Map.toList times)))))
- where
-  times = Map.fromListWith (+) [(inertUpTo 40 (nameText (spanName (nodeSpan n))), own n) | n <- nodes r]
-  entry (name, t) = name ++ " " ++ secondsText t ++ percent t
-  percent t
-    | total > 0, t <= total = " (" ++ show (round (100 * t / total) :: Int) ++ " %)"
-    | otherwise = ""
-  total = until r - from r
-  commas [] = "nothing took time"
-  commas texts = foldr1 (\a b -> a ++ ",  " ++ b) texts
-  own n = max 0 (end - begin - covered begin [interval c | c <- sortOn (spanBegan . nodeSpan) (nodeChildren n)])
-   where
-    (begin, end) = interval n
-    covered _ [] = 0
-    covered done ((a, b) : rest)
-      | b' > a' = (b' - a') + covered b' rest
-      | otherwise = covered done rest
-     where
-      a' = max a done
-      b' = min b end
-  interval n = (spanBegan (nodeSpan n), nodeUntil r n)
 
 -- Round steps, about ten of them.
 ticks :: Double -> [(Double, String)]
@@ -142,14 +112,17 @@ bar limit y h r stopRequests m
   top = y (markLane m)
   w = markRight m - markLeft m
   about = titled $ if isMerged m then severalSpans m else aboutSpan limit r (markNode m)
-  -- The time from the request to stop until it had stopped is hatched.
-  stopping = case nodeEnd (markNode m) of
-    Just (_, StoppedBy (SignalChanged n _))
-      | Just request <- IntMap.lookup n stopRequests
-      , let from' = max (markLeft m) request
-      , markRight m - from' > 2 ->
-          [shape "h" (barShape Stop from' top (markRight m - from') h)]
-    _ -> []
+  stopping = [shape "h" (barShape Stop from' top (markRight m - from') h) | Just from' <- [stoppingFrom stopRequests m]]
+
+-- Where the hatched part of a bar begins, if it can be seen: the time from the request to stop until it had stopped.
+stoppingFrom :: IntMap Double -> Mark -> Maybe Double
+stoppingFrom stopRequests m = case nodeEnd (markNode m) of
+  Just (_, StoppedBy (SignalChanged n _))
+    | Just request <- IntMap.lookup n stopRequests
+    , let from' = max (markLeft m) request
+    , not (isMerged m) && markRight m - markLeft m >= 3 && markRight m - from' > 2 ->
+        Just from'
+  _ -> Nothing
 
 severalSpans :: Mark -> [String]
 severalSpans m = [some (markCount m) "span" ++ how, list (map (inertUpTo 60 . nameText) (markNames m))]
@@ -173,22 +146,3 @@ aboutSpan limit r n =
   ]
  where
   s = nodeSpan n
-
-legend :: Bool -> Element
-legend merged = group "le" (fst (foldl entry ([], margin) entries))
- where
-  entry (done, left) (draw, word) =
-    (done ++ [draw left, textAt "q" (left + 32) 84 [("", word)]], left + 32 + textWidth word + 16)
-  outcome o left = path (Text.unwords ["b", outcomeClass o]) (barShape o left 73 26 13) mempty
-  entries =
-    [ (outcome Success, "succeeded")
-    , (outcome Failure, "failed")
-    , (outcome Fault, "faulted")
-    , (outcome Stop, "stopped")
-    , (\left -> shape "h" (barShape Stop left 73 26 13), "while stopping")
-    , (outcome Running, "not ended")
-    , (flip arrowSample 79.5, "a signal changed → stopped → started")
-    ]
-      ++ [(several, "short spans, together") | merged]
-  several left =
-    group "" [shape "m v2 s" (markShape Success left 73 26 13), shape "m f" (markShape Failure (left + 8) 73 2 13)]

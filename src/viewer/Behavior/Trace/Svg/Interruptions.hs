@@ -8,12 +8,15 @@ module Behavior.Trace.Svg.Interruptions
   , interruptionsBottom
   , interruptionArrows
   , interruptionLabels
+  , interruptionsBelow
+  , Effect (..)
+  , interruptionEffects
   , arrowSample
   ) where
 
 import Data.Bifunctor (bimap)
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (intercalate, nubBy, sortOn)
+import Data.List (intercalate, nub, nubBy, sortOn)
 import Data.Maybe (fromMaybe, isJust, isNothing, listToMaybe, mapMaybe)
 import Data.Text (Text)
 import qualified Data.Text as Text
@@ -32,7 +35,15 @@ data Interruptions = Interruptions
   -- ^ The lower end of their labels, where the lanes may begin.
   , interruptionArrows :: Element
   , interruptionLabels :: Element
+  , interruptionsBelow :: [(Int, (Double, Double))]
+  -- ^ In which lane, and between which pixels, arrows are directly below the bars.
+  , interruptionEffects :: [Effect]
+  -- ^ Of which kinds they are.
   }
+
+-- | What a change of a signal did.
+data Effect = Interrupts | OnlyStarts
+  deriving (Eq, Show)
 
 -- Reactions whose markers would be at the same place.
 data Marker = Marker
@@ -44,14 +55,17 @@ data Marker = Marker
 type Label = (Int, Maybe (Double, Double, [Part]))
 
 -- | Given the pixels between which they are, and where the rows of their labels begin; the height
--- of a bar; where a time and where a lane is; the spans; the recording.
+-- of a bar, and the space between two; where a time and where a lane is; the spans; the recording. Only the arrows
+-- depend on where the lanes are.
 layInterruptions
-  :: Double -> Double -> Double -> Double -> (Seconds -> Double) -> (Int -> Double) -> [Placed] -> Recording -> Interruptions
-layInterruptions left right top barHeight x y placed recorded =
+  :: Double -> Double -> Double -> (Double, Double) -> (Seconds -> Double) -> (Int -> Double) -> [Placed] -> Recording -> Interruptions
+layInterruptions left right top (barHeight, gap) x y placed recorded =
   Interruptions
     { interruptionsBottom = top + rowHeight * fromIntegral rows
     , interruptionArrows = group (if isThin then "thin" else "") (concatMap arrows labelled)
     , interruptionLabels = group "il" (concatMap label labelled)
+    , interruptionsBelow = [(placedLane from, below (ends from to)) | m <- markers, (from, to) <- pairsOf m]
+    , interruptionEffects = nub (map effectOf markers)
     }
  where
   markers = case together 4 found of
@@ -69,37 +83,54 @@ layInterruptions left right top barHeight x y placed recorded =
   byNumber = IntMap.fromList [(spanNumber (nodeSpan (placedNode p)), p) | p <- placed]
 
   arrows (m, (row, _)) =
-    map (arrow . downTo) (distinct targets) ++ map (arrow . uncurry onward) (nubBy sameLanes pairs)
+    map (arrow . downTo) (distinct targets) ++ map (arrow . uncurry onward) (nubBy sameLanes (pairsOf m))
    where
-    targets = take 12 (concatMap targetsOf (markerReactions m))
-    pairs = [(from, to) | r <- markerReactions m, from : _ <- [find' stopped r], to : _ <- [find' started r]]
+    targets = take 12 (concatMap (targetsOf (markerX m)) (markerReactions m))
     sameLanes (a, b) (a', b') = placedLane a == placedLane a' && placedLane b == placedLane b'
-    downTo p = verticalArrow (markerX m) (rowY row + 6) (y (placedLane p))
-    distinct = nubBy (\a b -> placedLane a == placedLane b)
-  -- What was stopped; else what was started; else where the operator ran.
-  targetsOf r = case (find' stopped r, find' started r) of
+    downTo (tip, p) = downArrow gap (markerX m, rowY row + 6) (tip, y (placedLane p))
+    distinct = nubBy (\a b -> placedLane (snd a) == placedLane (snd b))
+  pairsOf m = [(from, to) | r <- markerReactions m, from : _ <- [find' stopped r], to : _ <- [find' started r]]
+  -- What was stopped; else what was started; else where the operator ran. And the pixel at which the arrow ends: not
+  -- where two bars meet.
+  targetsOf at r = case (find' stopped r, find' started r) of
     ([], []) -> case reactionParent r of
-      Inside n -> maybe [] pure (IntMap.lookup n byNumber)
+      Inside n -> maybe [] (\p -> [(at, p)]) (IntMap.lookup n byNumber)
       _ -> []
-    ([], p : _) -> [p]
-    (ps, _) -> ps
-  onward from to = onwardArrow barHeight (box from) (box to)
+    ([], p : _) -> [(max at (afterBegin 8 p), p)]
+    (ps, _) -> [(min at (beforeEnd 8 p), p) | p <- ps]
+  onward from to
+    | placedLane from == placedLane to = bracket (min 9 (gap - 3)) (ends from to) (y (placedLane from) + barHeight)
+    | otherwise = onwardCurve (fst (ends from to), y (placedLane from) + barHeight) (placedLeft to, y (placedLane to) + barHeight / 2)
   arrow = if isThin then shape "ar" else arrowOver
   isThin = length markers > 40
+  below (a, b) = (min a b - 6, max a b + 6)
   find' known r = IntMap.findWithDefault [] (reactionNumber r) known
-  box p = (placedLeft p, placedRight p, y (placedLane p))
 
   label (m, (row, known)) =
-    path "i" (diamond (markerX m) (rowY row)) (titled about)
+    path (effectClass (effectOf m)) (diamond (markerX m) (rowY row)) (titled about)
       : maybe [] (\(at, _, parts) -> [textAt "" at (rowY row + 4) parts]) known
    where
     about = case markerReactions m of
       [r] -> [described r]
-      several -> some (length several) "interruption" : map (inertUpTo 100 . described) (take 2 several)
+      several -> changesOf several : map (inertUpTo 100 . described) (take 2 several)
     described r = uncurry reactionText (names r) r
 
 rowHeight :: Double
 rowHeight = 20
+
+-- (Several changes at one place are an interruption, if one of them is.)
+effectOf :: Marker -> Effect
+effectOf m = if any (isJust . reactionStopped) (markerReactions m) then Interrupts else OnlyStarts
+
+effectClass :: Effect -> Text
+effectClass Interrupts = "i"
+effectClass OnlyStarts = "io"
+
+-- How many of them interrupted something, and how many only started something.
+changesOf :: [Reaction] -> String
+changesOf rs = intercalate ", " [some n what | (n, what) <- [(interruptions, "interruption"), (length rs - interruptions, "start")], n > 0]
+ where
+  interruptions = length (filter (isJust . reactionStopped) rs)
 
 -- For each reaction the spans that are in no other one of the same reaction, by lane.
 outermost :: [(Int, Placed)] -> IntMap.IntMap [Placed]
@@ -125,17 +156,18 @@ rowsFor left right names markers = map final chosen
  where
   -- The longest texts with which as many as possible have one.
   chosen = chosenFrom True (snd (head (sortOn fst [(without (chosenFrom False known), known) | known <- lengths])))
-  lengths = [texts, drop 1 . texts, drop 2 . texts]
+  lengths = [texts, drop 1 . texts, shortest]
+  shortest = take 1 . reverse . texts
   without = length . filter (isNothing . snd . snd)
   final (_, (_, Nothing)) = (1 + maximum (-1 : [row | (_, (row, Just _)) <- chosen]), Nothing)
   final (_, l) = l
   chosenFrom :: Bool -> (Marker -> [[Part]]) -> [(Marker, Label)]
   chosenFrom crossing ofMarker = reverse (foldl choose [] markers)
    where
-    choose done m = (m, fromMaybe (-1, Nothing) (listToMaybe (mapMaybe (fits False done m) options ++ mapMaybe (fits True done m) (if crossing then shortest else [])))) : done
+    choose done m = (m, fromMaybe (-1, Nothing) (listToMaybe (mapMaybe (fits False done m) options ++ mapMaybe (fits True done m) (if crossing then crossed else [])))) : done
      where
       options = [(row, l) | l <- candidates (ofMarker m) m, row <- [0 .. 5]]
-      shortest = [(row, l) | l <- candidates (drop 2 (texts m)) m, row <- [0 .. 5]]
+      crossed = [(row, l) | l <- candidates (shortest m) m, row <- [0 .. 5]]
   -- Better an arrow behind a label than no label.
   fits crossed done m (row, l@(at, w, _))
     | any conflict (take 200 done) = Nothing
@@ -159,14 +191,17 @@ rowsFor left right names markers = map final chosen
     | room <- right - markerX m - 24, room > 90 = [(markerX m + 12, room, [("k", fitted (room / 1.12) (snd part))])]
   cut _ _ = []
   texts m = case markerReactions m of
-    [r] -> [[("k", changesOf r), ("q", inertUpTo 160 (long r))], [("k", changesOf r), ("q", inertUpTo 80 (short r))], [("k", changesOf r)]]
+    [r] -> [[("k", changed), ("q", what)] | (changed, what) <- variants r, not (null what)] ++ [[("k", values r)]]
     several
-      | null (drop 40 markers) -> replicate 3 [("k", some (length several) "interruption")]
+      | null (drop 40 markers) -> [[("k", changesOf several)]]
       | otherwise -> []
-  changesOf r = inertUpTo 120 (intercalate " → " (fst (partsOf r)))
+  variants r = [(values r, inertUpTo 160 (long r)), (values r, inertUpTo 80 (short r)), (briefly r, inertUpTo 80 (short r))]
+  values r = inertUpTo 120 (intercalate " → " (fst (partsOf r)))
+  -- Without the values before.
+  briefly r = values r {reactionChanges = [c {changeBefore = Nothing} | c <- reactionChanges r]}
   partsOf r = uncurry reactionParts (names r) r
   long r = arrows (snd (partsOf r))
-  short r = arrows (foldMap (pure . stoppedText (map fst (fst (names r)))) (reactionStopped r) ++ foldMap (pure . startedText (snd (names r))) (reactionStarts r))
+  short r = arrows ([stoppedText (map fst (fst (names r))) b | Just b <- [reactionStopped r]] ++ startsText (snd (names r)) r)
   arrows = unwords . map ("→ " ++)
 
 diamond :: Double -> Double -> Text
@@ -176,24 +211,49 @@ diamond x y = Text.concat ["M", px (x - 6), " ", px y, "l6 -6 6 6-6 6Z"]
 arrowOver :: Text -> Element
 arrowOver d = group "" [shape "ha" d, shape "ar" d]
 
-verticalArrow :: Double -> Double -> Double -> Text
-verticalArrow x from to = Text.concat ["M", px x, " ", px from, "V", px to, "m-4 -6l4 6 4-6"]
-
--- From the lower edge of what was stopped, where it ends, to where the other one begins: from below
--- if that is in the same lane, else from the left.
-onwardArrow :: Double -> (Double, Double, Double) -> (Double, Double, Double) -> Text
-onwardArrow h (left, right, y) (left', right', y')
-  | y == y' = curve (b, y + h + 12) (b, y + h) "m-4 5l4 -5 4 5"
-  | otherwise = curve (left' - 12, y' + h / 2) (left', y' + h / 2) "m-6 -4l6 4-6 4"
+-- Straight down, and aside only at its end.
+downArrow :: Double -> (Double, Double) -> (Double, Double) -> Text
+downArrow gap (x, from) (tip, to)
+  | abs (tip - x) < 0.5 = Text.concat ["M", px x, " ", px from, "V", px to, headTowards 0 1]
+  | otherwise = Text.concat ["M", px x, " ", px from, "V", px (to - bend), "L", px tip, " ", px to, headTowards (tip - x) bend]
  where
-  curve (cx, cy) (x, to) end =
-    Text.concat ["M", px a, " ", px (y + h), "C", px a, " ", px cy, " ", px cx, " ", px cy, " ", px x, " ", px to, end]
-  -- (Never so near to each other that the arrow cannot be seen.)
-  (a, b) = if abs (b' - a') < 10 && y == y' then ((a' + b') / 2 - 5, (a' + b') / 2 + 5) else (a', b')
-  a' = max (left + (right - left) / 2) (right - 8)
-  b' = min (left' + (right' - left') / 2) (left' + 10)
+  bend = min 10 (gap - 1)
+
+-- The head of an arrow that goes there.
+headTowards :: Double -> Double -> Text
+headTowards dx dy = "m" <> pair (bx - sx) (by - sy) <> "l" <> pair (sx - bx) (sy - by) <> " " <> pair (bx + sx) (by + sy)
+ where
+  pair a b = px a <> " " <> px b
+  far = sqrt (dx * dx + dy * dy)
+  (bx, by) = (-6 * dx / far, -6 * dy / far)
+  (sx, sy) = (4 * dy / far, -4 * dx / far)
+
+-- From the lower edge of what was stopped to the lower edge of what was started, around where they meet.
+bracket :: Double -> (Double, Double) -> Double -> Text
+bracket depth (a, b) bottom =
+  Text.concat ["M", px a, " ", px bottom, "v", px depth, "H", px b, "V", px bottom, headTowards 0 (-1)]
+
+-- From the lower edge of what was stopped to the left edge of what was started, in another lane.
+onwardCurve :: (Double, Double) -> (Double, Double) -> Text
+onwardCurve (a, bottom) (left, middle) =
+  Text.concat ["M", px a, " ", px bottom, "C", px a, " ", px middle, " ", px (left - 12), " ", px middle, " ", px left, " ", px middle, headTowards 1 0]
+
+-- Where an arrow from what was stopped to what was started begins and ends: never so near to each other that
+-- it cannot be seen.
+ends :: Placed -> Placed -> (Double, Double)
+ends from to
+  | placedLane from == placedLane to, abs (b - a) < 10 = ((a + b) / 2 - 5, (a + b) / 2 + 5)
+  | otherwise = (a, b)
+ where
+  a = beforeEnd 18 from
+  b = afterBegin 18 to
+
+-- That many pixels before its end, after its begin; but in its last third, in its first third.
+beforeEnd, afterBegin :: Double -> Placed -> Double
+beforeEnd d p = placedRight p - min d ((placedRight p - placedLeft p) / 3)
+afterBegin d p = placedLeft p + min d ((placedRight p - placedLeft p) / 3)
 
 -- | What an arrow looks like, for the legend.
-arrowSample :: Double -> Double -> Element
-arrowSample x y =
-  group "" [shape "i" (diamond (x + 5) y), shape "ar" (Text.concat ["M", px (x + 11), " ", px y, "H", px (x + 27), "m-5 -4l5 4-5 4"])]
+arrowSample :: Effect -> Double -> Double -> Element
+arrowSample e x y =
+  group "" [shape (effectClass e) (diamond (x + 5) y), shape "ar" (Text.concat ["M", px (x + 11), " ", px y, "H", px (x + 27), headTowards 1 0])]

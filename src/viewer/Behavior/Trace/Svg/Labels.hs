@@ -3,10 +3,13 @@
 -- |
 -- The texts of the bars of a timeline.
 module Behavior.Trace.Svg.Labels
-  ( labels
+  ( Label (..)
+  , labels
   ) where
 
-import Data.Maybe (fromMaybe, listToMaybe, mapMaybe)
+import Data.List (minimumBy)
+import Data.Maybe (fromMaybe, listToMaybe)
+import Data.Ord (comparing)
 import qualified Data.Text as Text
 import Graphics.Svg.Core (Element)
 
@@ -16,65 +19,134 @@ import Behavior.Trace.Recording (Node (..))
 import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Layout
 
--- | The names of the bars: in the bar, or beside it if there is room, or cut off. Below it the text of
--- its failure or fault, if there is room for that (and it is wanted). Nothing is further right than the given pixel.
-labels :: Bool -> Double -> (Int -> Double) -> Double -> [Mark] -> [Element]
-labels notes right y h = go (-1) 0 0
+-- | A text of a bar: in which lane, how many of its lines are below the bar, and what to draw, given the
+-- upper edge of the bar.
+data Label = Label
+  { labelLane :: !Int
+  , labelLinesBelow :: !Int
+  , labelDrawn :: Double -> [Element]
+  }
+
+-- | The names of the bars: in the bar, on two lines if one is too short; or beside it if there is room, with a
+-- line to the bar; or cut off. Below it the text of its failure or fault, if there is room for that (and it is
+-- wanted), but not over what is there in that lane already. Nothing is further right than the given pixel.
+-- The bars have that height.
+labels :: Bool -> Double -> Double -> [(Int, (Double, Double))] -> [Mark] -> [Label]
+labels notes right h taken = go (-1) 0 0
  where
   go _ _ _ [] = []
   -- The last text in this lane ends at `used`, the last one below its bars at `noted`.
   go lane used noted (m : later)
     | markLane m /= lane = go (markLane m) 0 0 (m : later)
-    | otherwise = found ++ note ++ go lane used' noted' later
+    | otherwise = map (Label lane 0) found ++ note ++ go lane used' noted' later
    where
-    next = take 1 (sameLane later)
-    sameLane = takeWhile ((== lane) . markLane)
-    (found, used', complete) = name lane used m (maybe right markLeft (listToMaybe next))
+    sameLane = takeWhile ((== lane) . markLane) later
+    (found, used', complete) = name right h used m (maybe right markLeft (listToMaybe sameLane))
     (note, noted')
-      | notes, not complete, markOutcome m `elem` [Failure, Fault] = below lane noted m (sameLane later) (null found)
+      | notes, not complete, isNoted m = below noted m sameLane (null found)
       | otherwise = ([], noted)
 
-  name lane used m next
-    | inside >= partsWidth full = at (markLeft m + 7) full True
-    | isMerged m && inside < 60 = ([], max used (markRight m), False)
-    | single, after >= partsWidth full = at (markRight m + 5) full True
-    | inside >= partsWidth short = at (markLeft m + 7) short False
-    | single, after >= partsWidth short = at (markRight m + 5) short False
-    | single, next >= right, markLeft m - used - 12 >= partsWidth short = at (markLeft m - 6 - partsWidth short) short False
-    | inside >= 24 = at (markLeft m + 7) [("k", fitted (inside / 1.12) (nameOf m))] False
-    | otherwise = ([], max used (markRight m), False)
-   where
-    single = not (isMerged m) && (w >= 3 || markOutcome m == Running)
-    w = markRight m - markLeft m
-    inside = w - 16
-    after = next - markRight m - 14
-    short = [("k", nameOf m)]
-    full = short ++ [("", detail) | Just detail <- [detailOf m]]
-    at left parts whole =
-      ( [textAt ground left (y lane + h / 2 + 4) parts]
-      , max (markRight m) (left + partsWidth parts)
-      , whole
+  below noted m later unnamed = case notedLines (room * 12 / 11) text of
+    [] -> ([], noted)
+    texts ->
+      ( [Label (markLane m) (length texts) (\top -> [textAt classes left (top + h + dy) [("", t)] | (dy, t) <- zip [12, 25] texts])]
+      , left + maximum (map textWidth texts) * 11 / 12 + 8
       )
-     where
-      ground
-        | left > markLeft m && left < markRight m = Text.cons 'o' (outcomeClass (markOutcome m))
-        | otherwise = ""
-
-  below lane noted m later unnamed
-    | room >= min 70 (textWidth text) =
-        ([textAt ("n n" <> outcomeClass (markOutcome m)) left (y lane + h + 12) [("", cut)]], left + textWidth cut + 8)
-    | otherwise = ([], noted)
    where
-    left = max (markLeft m) noted
-    cut = fitted room text
-    -- (Where a span was stopped, an arrow may be in the way.)
-    room = minimum (right - 4 : mapMaybe limit later) - left
-    limit o = case markOutcome o of
-      Stop -> Just (markRight o - 28)
-      Failure -> Just (markLeft o - 6)
-      Fault -> Just (markLeft o - 6)
-      _ -> Nothing
+    classes = "n n" <> outcomeClass (markOutcome m)
+    left = foldl past (max (markLeft m) noted) there
+    past at (l, r) = if at > l && at < r then r else at
+    there = [interval | (lane, interval) <- taken, lane == markLane m]
+    room = minimum (right - 4 : [l | (l, _) <- there, l >= left] ++ [markLeft o - 6 | o <- later, isNoted o, not (fitsWhole o)]) - left
     text = inertUpTo 120 ((if unnamed then nameOf m ++ ": " else "") ++ fromMaybe "" (whyOf m))
+
+-- What to draw, given the upper edge of the bar; where it ends; and whether it contains all there is to say.
+-- The last text in this lane ends at `used`, the next bar begins at `next`.
+name :: Double -> Double -> Double -> Mark -> Double -> ([Double -> [Element]], Double, Bool)
+name right h used m next
+  | fitsWhole m = inBar full True
+  | isMerged m && inside < 60 = nothingFits
+  | single, isExplained, after >= partsWidth full = behind full True
+  | inside >= partsWidth short = inBar short False
+  | Just (lines', False) <- stacked = onTwo lines'
+  | single, after >= partsWidth full = behind full True
+  | single, after >= partsWidth short = behind short False
+  | single, next >= right, markLeft m - used - 22 >= partsWidth short = before
+  | Just (lines', _) <- stacked = onTwo lines'
+  | inside >= 24 = inBar [("k", fitted (inside / 1.12) (nameOf m))] False
+  | otherwise = nothingFits
+ where
+  single = not (isMerged m) && (w >= 3 || markOutcome m == Running)
+  w = markRight m - markLeft m
+  inside = insideOf m
+  after = next - markRight m - 22
+  short = [("k", nameOf m)]
+  full = fullOf m
+  -- (The reason is not said at the change of a signal, nor below the bar.)
+  isExplained = case nodeEnd (markNode m) of
+    Just (_, StoppedBy (SignalChanged _ _)) -> False
+    Just (_, StoppedBy _) -> True
+    _ -> False
+  stacked
+    | h >= 24, inside >= 24 = onTwoLines ((inside + 6) * 1.2) (nameOf m)
+    | otherwise = Nothing
+  inBar parts = at (markLeft m + 7) parts []
+  behind parts = at (markRight m + 14) parts [leader (markRight m - notch) (markRight m + 11)]
+  before = at left short [leader (left + partsWidth short + 3) (markLeft m)] False
+   where
+    left = markLeft m - 14 - partsWidth short
+  at left parts more whole =
+    ([\top -> textAt (groundAt left) left (top + h / 2 + 4) parts : map ($ top) more], max (markRight m) (left + partsWidth parts), whole)
+  onTwo (one, two) =
+    ( [\top -> [textAt (groundAt left <> " z") left (top + h / 2 + dy) [("", t)] | (dy, t) <- [(-1.5, one), (9, two)]]]
+    , markRight m
+    , False
+    )
+   where
+    left = markLeft m + 5
+  nothingFits = ([], max used (markRight m), False)
+  leader from to top = shape "ld" (Text.concat ["M", px from, " ", px (top + h / 2), "H", px to])
+  notch = case markOutcome m of
+    Stop -> min 4 (w / 4)
+    Failure -> min 8 (w / 2)
+    _ -> 0
+  groundAt left
+    | left > markLeft m && left < markRight m = Text.cons 'o' (outcomeClass (markOutcome m))
+    | otherwise = ""
+
+fitsWhole :: Mark -> Bool
+fitsWhole m = insideOf m >= partsWidth (fullOf m)
+
+insideOf :: Mark -> Double
+insideOf m = markRight m - markLeft m - 16
+
+fullOf :: Mark -> [Part]
+fullOf m = ("k", nameOf m) : [("", detail) | Just detail <- [detailOf m]]
+
+-- The text of its failure or fault belongs below it, if it is nowhere else.
+isNoted :: Mark -> Bool
+isNoted m = markOutcome m `elem` [Failure, Fault]
+
+-- The text on one line or two, each no wider than that; or cut off, if much of it remains.
+notedLines :: Double -> String -> [String]
+notedLines room text
+  | textWidth text <= room = [text]
+  | Just ((one, two), isCut) <- onTwoLines room text, room >= 70 || not isCut = [one, two]
+  | room >= 70 = [fitted room text]
+  | otherwise = []
+
+-- The text on two lines of about the same width, and whether it is cut off, because it would be wider than that.
+-- Not if its first word is wider.
+onTwoLines :: Double -> String -> Maybe ((String, String), Bool)
+onTwoLines room text = case (filter fits breaks, takeWhile ((<= room) . textWidth . fst) breaks) of
+  (whole@(_ : _), _) -> Just (minimumBy (comparing widest) whole, False)
+  ([], cut@(_ : _)) -> Just (fitted room <$> last cut, True)
+  ([], []) -> Nothing
+ where
+  breaks = [(unwords a, unwords b) | k <- [1 .. length parts - 1], let (a, b) = splitAt k parts]
+  parts = words (take 200 text)
+  fits lines' = widest lines' <= room
+  widest (a, b) = max (textWidth a) (textWidth b)
 
 nameOf :: Mark -> String
 nameOf m
@@ -97,5 +169,5 @@ detailOf m
 whyOf :: Mark -> Maybe String
 whyOf m = case nodeEnd (markNode m) of
   _ | isMerged m -> Nothing
-  Just (_, how) | outcomeOf (markNode m) `elem` [Failure, Fault] -> Just (inertUpTo 200 (howText how))
+  Just (_, how) | isNoted m -> Just (inertUpTo 200 (howText how))
   _ -> Nothing
