@@ -11,6 +11,7 @@ module Drone
 
 import Control.Exception (bracket_, displayException, uninterruptibleMask_)
 import Control.Monad (forever)
+import Data.List (intercalate)
 
 import Behavior
 import Behavior.STM
@@ -54,5 +55,5 @@ survey :: Drone -> Behavior ()
 survey robot = do
   path <- newTVarIO (firstPath robot)
   let planner = forever (nextPath robot >>= atomically . writeTVar path)
-      flight = Signal.switch (Signal.watching (readTVar path)) (mapM_ (flyTo robot))
+      flight = Signal.switch (Signal.namedWith "path" (intercalate ", ") (Signal.watching (readTVar path))) (mapM_ (flyTo robot))
   film robot ||| planner ||| flight

@@ -40,6 +40,9 @@ spec = do
     it "with the time once in which a name ran twice" $
       whereMost (concat [ended k Top "arm" 0 Nothing 6 Succeeded | k <- [1, 2]] ++ ended 3 Top "wait" 6 Nothing 10 Succeeded)
         `shouldBe` "arm:6 s (60 %, twice),wait:4 s (40 %)"
+    it "with how many others there are" $
+      whereMost (concat [ended k Top ("leg " ++ show k) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. 10]])
+        `shouldBe` "leg 1:1 s (10 %),leg 10:1 s (10 %),leg 2:1 s (10 %),leg 3:1 s (10 %)and 6 others"
     it "if nothing took time" $ whereMost (ended 1 Top "a" 1 Nothing 1 Succeeded) `shouldBe` "nothing took time"
     it "with shares of the whole" . property $ forAllBlind likelyEvents $ \events ->
       let shares = [read (reverse (takeWhile isDigit (reverse known))) :: Int | (known, rest) <- splits (whereMost (map renamed events)), " %" `isPrefixOf` rest]

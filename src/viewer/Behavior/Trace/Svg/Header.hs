@@ -70,13 +70,15 @@ times n = show n ++ " times"
 data Taken = Taken String Seconds [Node]
 
 -- | The names that took most of the time, at the first level where it is divided: each with its time, its
--- share of the whole, and how often it ran. No wider than that number of pixels.
+-- share of the whole, and how often it ran; and how many others took at least a hundredth of it. No wider
+-- than that number of pixels.
 whereTimeWent :: Double -> Recording -> [Part]
 whereTimeWent width r = ("q", "most of the time:") : last (head lines' : takeWhile ((<= width) . partsWidth) lines')
  where
-  lines' = case map concat (drop 1 (inits (map entry listed))) of
+  lines' = case drop 1 (inits (take 4 listed)) of
     [] -> [[("", "nothing took time")]]
-    some' -> map commas some'
+    some' -> [commas (concatMap entry these) ++ others (length listed - length these) | these <- some']
+  others n = [("", "and " ++ some n "other") | n > 0]
   listed = case span (\(Taken _ t _) -> t >= 0.01 * total) (mostOf r) of
     ([], rest) -> take 1 rest
     (seen, _) -> seen
@@ -92,7 +94,7 @@ whereTimeWent width r = ("q", "most of the time:") : last (head lines' : takeWhi
   commas (a : (c, t) : rest@(_ : _)) = a : (c, t ++ ",") : commas rest
   commas parts = parts
 
--- At most four names, those that took most of the time first. Where one name took nearly all of it, those in
+-- The names that took time, those that took most of it first. Where one name took nearly all of it, those in
 -- its spans, and the time that they leave of it. Where there are many names that took little, those in them.
 mostOf :: Recording -> [Taken]
 mostOf r = level [] (roots r)
@@ -102,11 +104,11 @@ mostOf r = level [] (roots r)
     | sumOf here < total / 2, not (null (inner ns)), sumOf deeper > sumOf here = deeper
     | otherwise = here
    where
-    here = take 4 (sortOn (\(Taken _ t _) -> Down t) (filter (\(Taken _ t _) -> t > 0) (itself ++ byName r ns)))
+    here = sortOn (\(Taken _ t _) -> Down t) (filter (\(Taken _ t _) -> t > 0) (itself ++ byName r ns))
     deeper = level [] (inner ns)
   dominates (Taken _ t same) = t >= 0.9 * total && total > 0 && not (null (inner same))
   inner = concatMap nodeChildren
-  sumOf taken = sum [t | Taken _ t _ <- taken]
+  sumOf taken = sum [t | Taken _ t _ <- take 4 taken]
   total = until r - from r
 
 byName :: Recording -> [Node] -> [Taken]

@@ -34,7 +34,9 @@ data Interruptions = Interruptions
   { interruptionsBottom :: !Double
   -- ^ The lower end of their labels, where the lanes may begin.
   , interruptionArrows :: Element
+  -- ^ The markers, and what leads from them.
   , interruptionLabels :: Element
+  -- ^ The texts beside the markers.
   , interruptionsBelow :: [(Int, (Double, Double))]
   -- ^ In which lane, and between which pixels, arrows are directly below the bars.
   , interruptionEffects :: [Effect]
