@@ -4,14 +4,15 @@
 -- Traces on real threads: names, parents, causes, and paths of failures.
 module Trace.TraceSpec (spec) where
 
-import Control.Concurrent (forkIO)
+import Control.Concurrent (forkIO, yield)
 import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception
-import Control.Monad (join, void)
+import Control.Monad (void)
 import Data.Foldable (for_)
 import Data.IORef (modifyIORef', newIORef, readIORef, writeIORef)
 import Data.List (isPrefixOf)
 import Data.Maybe (fromMaybe, listToMaybe)
+import GHC.Conc (ThreadStatus (..), threadStatus)
 import Test.Hspec
 
 import Behavior
@@ -183,7 +184,7 @@ causes = do
     abandon <- newIORef (pure ())
     let receive event = do
           case event of
-            Began s | spanName s == "stuck" -> join (readIORef abandon)
+            Began s | spanName s == "stuck" -> readIORef abandon >>= forkIO >>= untilNotRunning
             _ -> pure ()
           modifyIORef' seen (event :)
     withTrace [] . named "outer" $ do
@@ -192,6 +193,7 @@ causes = do
         (stuck, abandoned) <- abandonableIn ((\here -> inPlace here (named "stuck" (pure ()))) <$> myPlace)
         writeIORef abandon abandoned
         stuck
+    eventually ((== 2) . length <$> readIORef seen)
     reported <- reverse <$> readIORef seen
     [event | event <- reported, Began _ <- [event]] `shouldBe` take 1 reported
     [(spanName s, end) | Ended s _ end <- drop 1 reported] `shouldBe` [("stuck", StoppedBy WasAbandoned)]
@@ -201,6 +203,7 @@ causes = do
       begun <- newGate
       (_, seen) <- traceOf (act begun (named "stoppable" (Support.open begun >> hang)))
       [c | Ended s _ (StoppedBy c) <- seen, spanName s == "stoppable"] `shouldBe` [expected]
+  untilNotRunning thread = threadStatus thread >>= \status -> if status == ThreadRunning then yield >> untilNotRunning thread else pure ()
   untilStopped child = atomically (void (tryAwait child >>= maybe retry pure))
   cancelledFrom begun act = try (cancellingSelf (pass begun) act) >>= either (\(Cancel _) -> pure ()) pure
 

@@ -29,7 +29,7 @@ module Behavior.Internal.Trace.Place
   , newestTrace
   ) where
 
-import Control.Concurrent (ThreadId, myThreadId)
+import Control.Concurrent (MVar, ThreadId, myThreadId, newMVar)
 import Control.Exception (SomeException, bracket_, throwIO, try)
 import Data.Bits ((.&.))
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
@@ -75,8 +75,7 @@ data Open = Open
   , openAt :: !Place
   -- ^ Where it began.
   , claimed :: !(IORef Bool)
-  -- ^ Whether its end has been reported, or may not be yet: its beginning comes first. (If it may be
-  -- abandoned, two threads can report its end.)
+  -- ^ Whether its end has been reported. (If it may be abandoned, two threads can do that.)
   }
 
 -- | A trace while it is made. A trace inside another one uses the numbers of the outer one,
@@ -89,6 +88,8 @@ data Trace = Trace
   , recordsDetail :: !Bool
   -- ^ Whether a receiver needs operators and branches.
   , receivers :: [Receiver]
+  , abandonLock :: !(MVar ())
+  -- ^ For what is reported of branches that may be abandoned. It is taken only for a moment.
   }
 
 -- | What receives the events of a trace. It must neither block nor throw.
@@ -101,7 +102,7 @@ data Receiver = Receiver
 
 -- | A trace on this clock, which has no receiver yet.
 newTrace :: IO Seconds -> IO Trace
-newTrace time = (\n -> Trace {lastNumber = n, traceClock = time, recordsDetail = False, receivers = []}) <$> newIORef 0
+newTrace time = (\n -> Trace n time False []) <$> newIORef 0 <*> newMVar ()
 
 -- | The trace with one more receiver.
 withReceiver :: Receiver -> Trace -> Trace

@@ -18,12 +18,13 @@ module Behavior.Internal.Trace.Span
   , parentFor
   ) where
 
-import Control.Exception (SomeException, mask, throwIO, try)
+import Control.Concurrent.MVar (withMVar)
+import Control.Exception (SomeException, mask, throwIO, try, uninterruptibleMask_)
 import Control.Monad (unless, when)
 import Data.Foldable (for_, traverse_)
-import Data.IORef (IORef, atomicModifyIORef', atomicWriteIORef, newIORef, readIORef)
+import Data.IORef (IORef, atomicModifyIORef', newIORef)
 import qualified Data.IntMap.Strict as IntMap
-import Data.Maybe (isJust, isNothing)
+import Data.Maybe (isJust)
 import Data.Traversable (for)
 
 import Behavior.Internal.Failure (Behavior)
@@ -114,21 +115,18 @@ spanning :: SpanKind -> String -> Place -> IO a -> IO (Either SomeException a)
 spanning kind name place act = do
   n <- newNumber place
   t <- traceClock (trace place)
-  open <- newIORef True >>= register . Open n kind name t place
-  reportSpan Began open
-  hasBegun open
+  claim <- newIORef False
+  open <- inTurn $ do
+    open <- register (Open n kind name t place claim)
+    open <$ reportSpan Began open
   end <- try (inPlace (Just (within open)) act)
-  endOf end >>= \how -> endSpan how open
-  for_ (abandonable (openAt open)) (`modify` fmap (IntMap.delete n))
+  how <- endOf end
+  inTurn $ do
+    endSpan how open
+    for_ (abandonable (openAt open)) (`modify` fmap (IntMap.delete n))
   pure end
-
--- | The beginning of the span has been reported. So now its end may be, also by another thread; if that
--- was already to do it, this thread does.
-hasBegun :: Open -> IO ()
-hasBegun open = do
-  atomicWriteIORef (claimed open) False
-  isAbandoned <- any isNothing <$> traverse readIORef (abandonable (openAt open))
-  when isAbandoned (endSpan (StoppedBy WasAbandoned) open)
+ where
+  inTurn report = if null (abandonable place) then report else oneAtATime (trace place) report
 
 -- | Registers an open span in the branches around it that may be abandoned. If one has been
 -- abandoned, the span's parent has ended: so its parent is unknown.
@@ -148,7 +146,13 @@ abandonableIn act =
     Just place -> do
       spans <- newIORef (Just IntMap.empty)
       a <- inPlace (Just place {abandonable = spans : abandonable place}) act
-      pure (a, atomicModifyIORef' spans ((,) Nothing) >>= traverse_ (traverse_ (endSpan (StoppedBy WasAbandoned)) . reverse . IntMap.elems))
+      let ends known = traverse_ (endSpan (StoppedBy WasAbandoned)) (reverse (IntMap.elems known))
+      pure (a, oneAtATime (trace place) (atomicModifyIORef' spans ((,) Nothing) >>= traverse_ ends))
+
+-- | What is reported of a branch while it is abandoned would otherwise come in the wrong order: its end
+-- before its beginning, or after its parent's end.
+oneAtATime :: Trace -> IO a -> IO a
+oneAtATime t report = uninterruptibleMask_ (withMVar (abandonLock t) (const report))
 
 -- | The place in a span.
 within :: Open -> Place
