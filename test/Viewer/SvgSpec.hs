@@ -4,7 +4,6 @@ import Data.Bifunctor (first)
 import Data.Char (isDigit, isSpace)
 import Data.List (isInfixOf, isPrefixOf, nub, (\\))
 import qualified Data.Text.Lazy as Lazy
-import qualified Data.Text.Lazy.Encoding as Lazy
 import Test.Hspec hiding (after)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck
@@ -20,7 +19,7 @@ import Viewer.Xml
 
 spec :: Spec
 spec = do
-  golden "mission-timeline.svg" (Lazy.encodeUtf8 (timeline (recording mission)))
+  goldenSvg "mission-timeline.svg" (timeline (recording mission))
 
   describe "is one file that does nothing" $ do
     let check events = case readXml (svg events) of
