@@ -17,7 +17,7 @@ module Trace.Recorder
   ) where
 
 import Control.Concurrent (myThreadId)
-import Control.Exception (Exception (..), SomeException, mask, throwIO, try)
+import Control.Exception (Exception (..), SomeException (..), mask, throwIO, try)
 import Data.Bits (shiftR, xor)
 import Data.IORef
 
@@ -135,8 +135,9 @@ howOf = \case
     | isCancellation e -> IsStopped
     | otherwise -> Faults' (text e)
  where
+  -- (Of the exception alone: newer versions of GHC add where it was thrown.)
   text :: SomeException -> String
-  text = displayException
+  text (SomeException e) = displayException e
 
 -- | Whether the part was stopped; the exceptions that are thrown to a plain thread may have a
 -- synchronous type.
