@@ -6,7 +6,7 @@
 -- equally. (In a tool that measures each case in one go, it would affect single cases.)
 module Main (main) where
 
-import Control.Concurrent (forkIO, killThread, newEmptyMVar, putMVar, readMVar, runInUnboundThread, takeMVar, threadDelay, yield)
+import Control.Concurrent (forkIO, killThread, newEmptyMVar, putMVar, runInUnboundThread, takeMVar, threadDelay, yield)
 import Control.Concurrent.Async (Concurrently (..), concurrently_, mapConcurrently_, race, withAsync)
 import Control.Concurrent.STM (TVar, newTVarIO, readTVar, writeTVar)
 import qualified Control.Concurrent.STM as STM
@@ -22,7 +22,7 @@ import Behavior
 import Behavior.Parallel (allOf, decide, firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically)
-import Behavior.Trace (Sink (..), named, withTrace)
+import Behavior.Trace (Sink (..), TraceOptions (..), defaultTraceOptions, named, withTrace, withTraceOptions)
 import Measured
 
 main :: IO ()
@@ -92,7 +92,8 @@ tracing setting =
   , traced "named" 50000 (named "span" succeeds)
   , Case (setting ++ " traced named, the sink blocked") 50000 $ \n -> do
       gate <- newEmptyMVar
-      withTrace [EachEvent (\_ -> readMVar gate)] (replicateM_ n (named "span" succeeds) >> putMVar gate ())
+      withTraceOptions defaultTraceOptions {waitAtEnd = 0} [EachEvent (\_ -> takeMVar gate)] (replicateM_ n (named "span" succeeds))
+      putMVar gate ()
   , Case (setting ++ " traced named, by two") 50000 $ \n ->
       inTrace (both (replicateM_ (n `div` 2) (named "span" succeeds)) (replicateM_ (n `div` 2) (named "span" succeeds)))
   , each (setting ++ " parallel") 10000 (parallel succeeds succeeds)
