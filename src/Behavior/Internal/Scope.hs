@@ -127,26 +127,30 @@ endedBy name end = Verdict cause (outcomeToIO end)
 -- | Runs the body of the operator with this name, which starts branches and gives a verdict; stops the
 -- branches that still run, and gives the outcome.
 structured :: String -> (Scope -> IO (Verdict a)) -> IO a
-structured operator body = operatorSpan operator $ do
+structured operator = operatorSpan operator inScope
+{-# INLINE structured #-}
+
+inScope :: (Scope -> IO (Verdict a)) -> IO a
+inScope body = do
   state <- getMaskingState
   mask $ \restore -> do
     scope <- Scope <$> newIORef []
     -- (Written as @body scope@ it would be a thunk first, in every operator.)
     verdict <- try (restore (pure scope >>= body))
-    (thrown, faults) <- case verdict of
-      Left e -> stopAll scope state (causeOf e) (Just e)
-      Right (Verdict cause _) -> stopAll scope state cause Nothing
+    (thrown, faults) <- stopAll scope state (either causeOf causeIn verdict) (either Just (const Nothing) verdict)
     deadlocked <- maybe (pure False) isDeadlock thrown
     case (thrown, faults) of
       (Just e, []) | not deadlocked -> throwIO e
       (Just e, fault : _) | not deadlocked -> withFault e fault
       -- An exception thrown at the caller while it could not be interrupted is received here,
       -- and not later, when the outcome has been thrown into one of the caller's handlers.
-      (_, []) -> restore checkpoint >> either throwIO (\(Verdict _ act) -> act) verdict
+      (_, []) -> restore checkpoint >> either throwIO verdictToIO verdict
       (_, fault : _) -> do
         restore checkpoint `catch` \e -> withFault e fault
         throwIO fault
  where
+  causeIn (Verdict cause _) = cause
+  verdictToIO (Verdict _ act) = act
   withFault e fault = defined e >>= \e' -> throwIO (StoppedWithFault e' fault)
 
 -- | Whether GHC threw it because it detected a deadlock. GHC throws that both to a branch and

@@ -13,7 +13,7 @@ module Behavior.Internal.Reactive.Engine
   ) where
 
 import Control.Concurrent.STM (STM, catchSTM, check)
-import Control.Exception (SomeException, onException, throwIO)
+import Control.Exception (SomeException, throwIO)
 import Data.Maybe (catMaybes, isJust)
 
 import Behavior.Internal.Failure (Behavior)
@@ -21,7 +21,7 @@ import Behavior.Internal.Runtime (Label (..), Seconds, atomically, tryReadThenBl
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
 import Behavior.Internal.Trace.Decision
-import Behavior.Internal.Trace.Place (isTraced)
+import Behavior.Internal.Trace.Place (Place, myPlace)
 
 -- | What an operator does for a value of the signal.
 data Reaction a
@@ -45,8 +45,8 @@ data Engine k a = Engine
   , scope :: Scope
   , source :: Source k
   , reaction :: k -> Reaction a
-  , tracing :: Bool
-  -- ^ Whether there is a trace, which shows the named values of the signal.
+  , place :: Maybe Place
+  -- ^ Where it is in a trace, which shows the named values of the signal.
   }
 
 -- | What wakes the operator.
@@ -67,21 +67,17 @@ react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react name signal toReaction = do
   -- (No branch has been started yet: what 'open' throws is simply thrown.)
   opened <- open (suppressEqual signal) everyValue
-  inTrace <- isTraced
-  structured name $ \within ->
-    startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction, tracing = inTrace} FirstRead Nothing
+  structured name $ \within -> do
+    here <- myPlace
+    startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction, place = here} FirstRead Nothing
 
--- | Starts the sensors, and reads the signal. (The values are those of the decision before.)
+-- | Starts the sensors, reads the signal, and does what its value requires. (The values are those of
+-- the decision before.)
 startOver :: Eq k => Engine k a -> ReadMode -> Maybe Values -> IO (Verdict a)
 startOver engine how before = do
   (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
-  select engine sensors seen how (decideOn engine Nothing before)
-
--- | Reads the signal, and does what its value requires. No branch runs.
-select :: Eq k => Engine k a -> Sensors -> View k -> ReadMode -> (Wakeup k a -> IO Decision) -> IO (Verdict a)
-select engine sensors seen how decided = do
   wakeup <- atomically (readWakeup engine sensors seen (readView how seen))
-  decided wakeup >>= applyReaction engine sensors seen wakeup
+  decideOn engine Nothing before wakeup >>= applyReaction engine sensors seen wakeup
 
 -- | Reads the signal. That runs users' code (views, functions, equality): what that code throws
 -- is caught here, so that any other exception in the operator's thread came from outside.
@@ -93,7 +89,7 @@ readWakeup engine sensors seen value =
  where
   changed = do
     k <- value
-    values <- if tracing engine then readings seen else pure []
+    values <- if isJust (place engine) then readings seen else pure []
     pure $! Changed k values (reaction engine k)
 
 -- | What the operator has decided, for the trace: which branch runs, and the values of the decision
@@ -101,8 +97,11 @@ readWakeup engine sensors seen value =
 decideOn :: Engine k a -> Maybe Ran -> Maybe Values -> Wakeup k a -> IO Decision
 decideOn engine ran before = \case
   Changed _ _ (TimeIsUp limit _) -> pure (timeIsUp limit)
-  Changed _ values next | isJust before || isReaction next -> decide (operator engine) ran before values
-  Changed _ values _ -> pure (begins values)
+  Changed _ values next -> case place engine of
+    Nothing -> pure (begins [])
+    Just here
+      | isJust before || isReaction next -> decide here (operator engine) ran before values
+      | otherwise -> pure (begins values)
   _ -> pure sensorDied
  where
   -- At the beginning.
@@ -119,7 +118,7 @@ applyReaction engine sensors seen woken decision = case woken of
   Changed _ _ (Conclude verdict) -> concluding verdict
   Changed _ _ (TimeIsUp _ verdict) -> concluding verdict
   Changed _ _ (RunToEnd name recovery) -> do
-    requestStopAsync (cause decision) (map SomeBranch sensors) `onException` report decision Nothing
+    orReported decision (requestStopAsync (cause decision) (map SomeBranch sensors))
     recover engine sensors decision name recovery Nothing
   Changed old values Idle -> do
     report decision Nothing
@@ -127,14 +126,14 @@ applyReaction engine sensors seen woken decision = case woken of
     decideOn engine Nothing (Just values) change >>= applyReaction engine sensors seen change
   Changed old values (Run name act) -> do
     report decision (Just name)
-    ran <- branchBegins name
+    ran <- traverse (`branchBegins` name) (place engine)
     running <- starting decision (branch (scope engine) (Label (operator engine) name) act)
     -- The branch is read first: one that has ended by itself is not interrupted, whatever
     -- the signal's value is in the same transaction.
     wakeup <-
       tryReadThenBlock (fmap BranchEnded <$> tryReadOutcome running) . atomically $
         tryReadOutcomeSTM running >>= maybe (awaitChange old) (pure . BranchEnded)
-    let interrupting next = decideOn engine (Just ran) (Just values) wakeup >>= interrupt engine sensors name running next
+    let interrupting next = decideOn engine ran (Just values) wakeup >>= interrupt engine sensors name running next
     case wakeup of
       BranchEnded end -> pure (endedBy name end)
       SensorDied e -> interrupting (Finish (throwIO e))
@@ -165,8 +164,7 @@ interrupt engine sensors name running next decision = case next of
       -- Read again: meanwhile the value may have changed again, perhaps back to the old one.
       Stopped _ -> do
         forget (scope engine) running
-        let read' = atomically (view (source engine)) >>= \seen -> (,) seen <$> atomically (readWakeup engine sensors seen (reread seen))
-        (seen, woken) <- read' `onException` report stopped Nothing
+        (seen, woken) <- orReported stopped readAgain
         applyReaction engine sensors seen woken stopped
       _ -> ended stopped end
  where
@@ -174,9 +172,13 @@ interrupt engine sensors name running next decision = case next of
   ended stopped end = endedBy name end <$ report stopped Nothing
   -- Waits for the branch, but not for the others.
   stopBranch others = do
-    let stopIt = requestStopAsync (cause decision) others >> requestStop (cause decision) [SomeBranch running] >> awaitOutcome running
-    end <- stopIt `onException` report decision Nothing
+    end <- orReported decision (stopIt others)
     (,) end <$> hasStopped (result end) decision
+  stopIt others =
+    requestStopAsync (cause decision) others >> requestStop (cause decision) [SomeBranch running] >> awaitOutcome running
+  readAgain = do
+    seen <- atomically (view (source engine))
+    (,) seen <$> atomically (readWakeup engine sensors seen (reread seen))
 
 -- | Runs the recovery to its end. The sensors' stop has been requested: the recovery does not
 -- wait for those that are slow to stop, but what comes after it does.

@@ -224,7 +224,7 @@ namedWith name render signal = Signal $ \demand -> do
 
 -- | The source whose readings include its value, if there is a trace, which needs them.
 showing :: String -> (a -> String) -> Source a -> IO (Source a)
-showing name render source = (\traced -> if traced then source {view = shown <$> view source} else source) <$> isTraced
+showing name render source = isTraced >>= \traced -> pure $! if traced then source {view = shown <$> view source} else source
  where
   shown seen = seen {readings = (\before a -> before ++ [(name, render a)]) <$> readings seen <*> reread seen}
 

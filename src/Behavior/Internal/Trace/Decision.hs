@@ -1,5 +1,4 @@
 {-# OPTIONS_HADDOCK not-home #-}
-{-# LANGUAGE LambdaCase #-}
 
 -- |
 -- What an operator reports when its signal has changed: the values, what was stopped, and what starts.
@@ -22,10 +21,11 @@ module Behavior.Internal.Trace.Decision
     -- * Reporting
   , hasStopped
   , report
+  , orReported
   , starting
   ) where
 
-import Control.Exception (SomeException, mask_)
+import Control.Exception (SomeException, mask_, onException)
 import Data.List (mapAccumL, nub)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
@@ -42,9 +42,9 @@ type Values = [(String, String)]
 -- | A branch, and when it began.
 data Ran = Ran String !Seconds
 
--- | The branch with this name begins now.
-branchBegins :: String -> IO Ran
-branchBegins name = Ran name <$> (myPlace >>= maybe (pure 0) (traceClock . trace))
+-- | The branch with this name begins now (here in a trace).
+branchBegins :: Place -> String -> IO Ran
+branchBegins here name = Ran name <$> traceClock (trace here)
 
 -- | An operator's decision, until what follows has been reported.
 data Decision = Decision
@@ -62,27 +62,24 @@ data Unreported = Unreported
   , known :: !Reaction
   }
 
--- | The operator with this name has decided: which branch runs, the values when it decided before, and
--- the values now, read in the transaction that decided.
-decide :: String -> Maybe Ran -> Maybe Values -> Values -> IO Decision
-decide operator branch before after =
-  myPlace >>= \case
-    Nothing -> pure (begins [])
-    Just here -> do
-      n <- newNumber here
-      t <- traceClock (trace here)
-      let changes = changesBetween (fromMaybe [] before) after
-          reaction =
-            Reaction
-              { reactionNumber = n
-              , reactionParent = Top -- differs between the receivers
-              , reactionOperator = operator
-              , reactionTime = t
-              , reactionChanges = changes
-              , reactionStopped = Nothing
-              , reactionStarts = Nothing
-              }
-      pure (Decision (SignalChanged n changes) after (Just (Unreported here branch reaction)))
+-- | The operator with this name has decided, here: which branch runs, the values when it decided before,
+-- and the values now, read in the transaction that decided.
+decide :: Place -> String -> Maybe Ran -> Maybe Values -> Values -> IO Decision
+decide here operator branch before after = do
+  n <- newNumber here
+  t <- traceClock (trace here)
+  let changes = changesBetween (fromMaybe [] before) after
+      reaction =
+        Reaction
+          { reactionNumber = n
+          , reactionParent = Top -- differs between the receivers
+          , reactionOperator = operator
+          , reactionTime = t
+          , reactionChanges = changes
+          , reactionStopped = Nothing
+          , reactionStarts = Nothing
+          }
+  pure (Decision (SignalChanged n changes) after (Just (Unreported here branch reaction)))
 
 -- | What the values were before, and are now. (Several signals may have the same name: then the first
 -- belongs to the first, and so on.)
@@ -96,7 +93,7 @@ changesBetween before after =
     let n = Map.findWithDefault (0 :: Int) name seen
      in (Map.insert name (n + 1) seen, ((name, n), value))
 
--- | The operator only begins: there was no change.
+-- | There is no change to report: the operator begins, or there is no trace.
 begins :: Values -> Decision
 begins values = Decision (SignalChanged 0 []) values Nothing
 
@@ -123,15 +120,27 @@ hasStopped end decision = maybe (pure decision) stopped (unreported decision)
 
 -- | Reports the reaction, and which branch starts.
 report :: Decision -> Maybe String -> IO ()
-report decision starts = mapM_ each (unreported decision)
- where
-  each what = reportEach (place what) $ \receiver ->
-    Reacted (known what) {reactionParent = parentFor receiver (place what), reactionStarts = starts}
+report decision starts = mapM_ (`reportReaction` starts) (unreported decision)
+{-# INLINE report #-}
+
+-- | Runs an action that belongs to the operator: if it throws, the reaction is reported as it is now.
+orReported :: Decision -> IO a -> IO a
+orReported decision act = maybe act (\what -> act `onException` reportReaction what Nothing) (unreported decision)
+{-# INLINE orReported #-}
 
 -- | Runs an action that starts a branch: the reaction has started the spans in it.
 starting :: Decision -> IO a -> IO a
-starting decision act = maybe act within (unreported decision)
+starting decision act = maybe act (`startingAfter` act) (unreported decision)
+{-# INLINE starting #-}
+
+reportReaction :: Unreported -> Maybe String -> IO ()
+reportReaction what starts = reportEach (place what) $ \receiver ->
+  Reacted (known what) {reactionParent = parentFor receiver (place what), reactionStarts = starts}
+{-# NOINLINE reportReaction #-}
+
+startingAfter :: Unreported -> IO a -> IO a
+startingAfter Unreported {place = here, known = what} =
+  mask_ . inPlace (Just here {amongNamed = after (amongNamed here), amongAll = after (amongAll here)})
  where
-  within Unreported {place = here, known = what} = mask_ (inPlace (Just here {amongNamed = after (amongNamed here), amongAll = after (amongAll here)}) act)
-   where
-    after position = position {startedBy = Just (reactionNumber what)}
+  after position = position {startedBy = Just (reactionNumber what)}
+{-# NOINLINE startingAfter #-}

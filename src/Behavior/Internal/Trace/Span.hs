@@ -88,15 +88,18 @@ spanned noting change name act =
     noting "ends"
     either (throwIO . change place) pure end
 
--- | The span of an operator, where those are recorded.
-operatorSpan :: String -> IO a -> IO a
-operatorSpan name act = isTraced >>= \traced -> if traced then inTrace else act
- where
-  inTrace =
-    myPlace >>= \case
-      Just place | recordsDetail (trace place) -> mask $ \restore -> spanning Operator name place (restore act) >>= either throwIO pure
-      _ -> act
+-- | Runs an operator with this body, in a span of its own where those are recorded. (Without a trace no
+-- closure is made of the two.)
+operatorSpan :: String -> (a -> IO b) -> a -> IO b
+operatorSpan name run body = isTraced >>= \traced -> if traced then operatorInTrace name (run body) else run body
 {-# INLINE operatorSpan #-}
+
+operatorInTrace :: String -> IO a -> IO a
+operatorInTrace name act =
+  myPlace >>= \case
+    Just place | recordsDetail (trace place) -> mask $ \restore -> spanning Operator name place (restore act) >>= either throwIO pure
+    _ -> act
+{-# NOINLINE operatorInTrace #-}
 
 -- | Runs a branch in that place, with a span of its own where those are recorded. Call it masked, and
 -- unmask the branch.
