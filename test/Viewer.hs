@@ -8,6 +8,7 @@ import qualified Viewer.FormatSpec
 import qualified Viewer.InterruptionSpec
 import qualified Viewer.PictureSpec
 import qualified Viewer.PlainLinesSpec
+import qualified Viewer.SimulatedSpec
 import qualified Viewer.SummarySpec
 import qualified Viewer.SvgSpec
 import qualified Viewer.TerminalSpec
@@ -32,6 +33,7 @@ main = hspec $ do
   describe "The summary" Viewer.SummarySpec.spec
   describe "The differences" Viewer.DiffSpec.spec
   describe "The trace-event format" Viewer.TraceEventsSpec.spec
+  describe "A simulated run" Viewer.SimulatedSpec.spec
   describe "Texts of others" Viewer.TextSpec.spec
   describe "Viewing" Viewer.ViewingSpec.spec
   describe "behavior-trace" Viewer.ToolSpec.spec

@@ -46,19 +46,25 @@ labels notes right h taken = go (-1) 0 0
       | notes, not complete, isNoted m = below noted m sameLane (null found)
       | otherwise = ([], noted)
 
-  below noted m later unnamed = case notedLines (room * 12 / 11) text of
-    [] -> ([], noted)
-    texts ->
-      ( [Label (markLane m) (length texts) (\top -> [textAt classes left (top + h + dy) [("", t)] | (dy, t) <- zip [12, 25] texts])]
-      , left + maximum (map textWidth texts) * 11 / 12 + 8
-      )
+  -- From the bar on to the right; or if there is no room, with its name, ending there.
+  below noted m later unnamed = case (notedLines (room left) (text unnamed), notedLines (room furthest) (text True)) of
+    ([], []) -> ([], noted)
+    ([], texts) -> noteAt (end - width texts) texts
+    (texts, _) -> noteAt left texts
    where
+    noteAt x texts =
+      ( [Label (markLane m) (length texts) (\top -> [textAt classes x (top + h + dy) [("", t)] | (dy, t) <- zip [12, 25] texts])]
+      , x + width texts + 8
+      )
     classes = "n n" <> outcomeClass (markOutcome m)
+    width texts = maximum (map textWidth texts) * 11 / 12
     left = foldl past (max (markLeft m) noted) there
     past at (l, r) = if at > l && at < r then r else at
+    furthest = maximum (noted : [r | (_, r) <- there, r <= left])
+    end = minimum (right - 4 : [l | (l, _) <- there, l >= left] ++ [markLeft o - 6 | o <- later, isNoted o, not (fitsWhole o)])
     there = [interval | (lane, interval) <- taken, lane == markLane m]
-    room = minimum (right - 4 : [l | (l, _) <- there, l >= left] ++ [markLeft o - 6 | o <- later, isNoted o, not (fitsWhole o)]) - left
-    text = inertUpTo 120 ((if unnamed then nameOf m ++ ": " else "") ++ fromMaybe "" (whyOf m))
+    room from = (end - from) * 12 / 11
+    text isNamed = inertUpTo 120 ((if isNamed then nameOf m ++ ": " else "") ++ fromMaybe "" (whyOf m))
 
 -- What to draw, given the upper edge of the bar; where it ends; and whether it contains all there is to say.
 -- The last text in this lane ends at `used`, the next bar begins at `next`.
