@@ -145,17 +145,23 @@ reentrant = do
   n <- readIORef count
   promise ("a sink that uses names received " ++ show n ++ " of 20 events; " ++ show reports) (n == 20 && null reports)
 
--- | A million events to a blocked sink, and what is kept of them.
+-- | Ten million events to a blocked sink and to one that receives them, and what is kept of them.
 bounded :: IO ()
-bounded = do
+bounded = forM_ ["blocked", "receiving"] $ \state -> do
   gate <- newEmptyMVar
-  (sizes, _) <- reportsOf . withTraceOptions defaultTraceOptions {queueLimit = 1000, waitAtEnd = 0} [EachEvent (\_ -> readMVar gate)] $
+  unless (state == "blocked") (putMVar gate ())
+  received <- newIORef (0 :: Int)
+  let sink e = modifyIORef' received (+ (case e of Lost n -> n; _ -> 1)) >> readMVar gate
+      what = "with a " ++ state ++ " sink"
+  (sizes, reports) <- reportsOf . withTraceOptions defaultTraceOptions {queueLimit = 1000, waitAtEnd = if state == "blocked" then 0 else 10} [EachEvent sink] $
     forM [1 .. 5 :: Int] $ \_ -> do
-      replicateM_ 100000 (named "x" (pure ()))
+      replicateM_ 1000000 (named "x" (pure ()))
       performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats
-  promise ("with a blocked sink there are these numbers of bytes: " ++ show sizes) (last sizes < head sizes + 100000)
-  putMVar gate ()
-  noThreads "bounded"
+  counted <- (+ sum [n | SinkLeft _ n <- reports]) <$> readIORef received
+  promise (what ++ " there are these numbers of bytes: " ++ show sizes) (last sizes < head sizes + 100000)
+  promise (what ++ " " ++ show counted ++ " of 10000000 events were counted") (counted == 10000000)
+  when (state == "blocked") (putMVar gate ())
+  noThreads ("bounded, " ++ what)
 
 -- | A sink that prints to a pipe that is not read. The report that it is left behind must not wait
 -- for it. (GHC's handler for uncaught exceptions flushes 'stdout', which the sink holds.)
