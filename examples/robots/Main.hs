@@ -103,7 +103,7 @@ pickAndPlaceDemo say = do
           Box -> void (both (step say "move to the box" 1) slips)
           _ -> step say ("move to " ++ show place) 0.5
       , gripper = \grip' -> do
-          step say ("gripper: " ++ show grip') 0.3
+          step say (if grip' == Open then "open" else "close") 0.3
           holds <- if grip' == Open then pure False else atomically (stateTVar grips (\left -> (take 1 left == [True], drop 1 left)))
           set held holds
       , holding = signal held
@@ -146,18 +146,19 @@ fleetDemo say = do
   orders <- driver world "orders" [(0.1, n) | n <- [1 .. 6]]
   chargers <- atomically (newTSem 1)
   handedOver <- newTVarIO (0 :: Int)
-  let robot who lowAt = do
+  let tell who text = say (who ++ ": " ++ text)
+      robot who lowAt = do
         low <- condition world (who ++ ": battery low") [(0, False), (lowAt, True)]
         pure
           Robot
             { Fleet.name = who
             , Fleet.carry = \order -> do
-                step say (who ++ ": carry order " ++ show order) 1
+                step (tell who) ("carry order " ++ show order) 1
                 when (who == "Bo" && order > 3) (throwIO (userError "a wheel is lost"))
             , Fleet.handOver = \order -> do
-                say (who ++ ": order " ++ show order ++ " is handed over")
+                tell who ("order " ++ show order ++ " is handed over")
                 atomically (modifyTVar' handedOver (+ 1))
-            , Fleet.charge = step say (who ++ ": charge") 0.8 >> set low False
+            , Fleet.charge = step (tell who) "charge" 0.8 >> set low False
             , Fleet.batteryLow = signal low
             , Fleet.withdrawn = pure False
             }

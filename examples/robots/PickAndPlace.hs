@@ -18,6 +18,7 @@ import qualified Behavior.Parallel as Parallel
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import qualified Behavior.Time as Time
+import Behavior.Trace (named)
 
 -- | A position on the table is given in centimetres.
 data Place = Above Double | At Double | Box
@@ -42,11 +43,11 @@ data Arm = Arm
 pickAndPlace :: Arm -> Behavior ()
 pickAndPlace arm = (pick >> (carry ? (pick >> carry)) >> gripper arm Open) `finally` parked
  where
-  pick = do
+  pick = named "pick" $ do
     position <- locate (detectors arm)
     moveTo arm (Above position)
-    Time.retrying [0.5, 1] (grip arm position)
-  carry = Signal.whileHolding (holding arm) (moveTo arm Box)
+    Time.retrying [0.5, 1] (named "grip" (grip arm position))
+  carry = named "carry" (Signal.whileHolding (holding arm) (moveTo arm Box))
   -- A plain @park arm@ would itself be stopped if a cancellation came while it runs. The limit
   -- is for an arm that is stuck.
   parked = Time.cleanupWithin 5 (park arm)

@@ -21,6 +21,7 @@ import Behavior.Sim (Outcome (..), outcome, simulate)
 import Behavior.Time (now, sleep)
 import Behavior.Trace
 import Behavior.Trace.File
+import Behavior.Trace.Format (decodeEvent)
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden

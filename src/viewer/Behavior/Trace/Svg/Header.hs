@@ -70,11 +70,15 @@ times n = show n ++ " times"
 data Taken = Taken String Seconds [Node]
 
 -- | The names that took most of the time, at the first level where it is divided: each with its time, its
--- share of the whole, and how often it ran; and how many others took at least a hundredth of it. No wider
+-- share of the whole, and how often it ran; and how many others took at least a hundredth of it. (If none took
+-- a fifth of it, the first words are others.) No wider
 -- than that number of pixels.
 whereTimeWent :: Double -> Recording -> [Part]
-whereTimeWent width r = ("q", "most of the time:") : last (head lines' : takeWhile ((<= width) . partsWidth) lines')
+whereTimeWent width r = ("q", lead) : last (head lines' : takeWhile ((<= width) . partsWidth) lines')
  where
+  lead = case listed of
+    Taken _ t _ : _ : _ | t < 0.2 * total -> "spread over " ++ some (length listed) "part" ++ ", the longest:"
+    _ -> "most of the time:"
   lines' = case drop 1 (inits (take 4 listed)) of
     [] -> [[("", "nothing took time")]]
     some' -> [commas (concatMap entry these) ++ others (length listed - length these) | these <- some']

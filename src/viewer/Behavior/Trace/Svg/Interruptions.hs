@@ -197,13 +197,18 @@ rowsFor left right names markers = map final chosen
     several
       | null (drop 40 markers) -> [[("k", changesOf several)]]
       | otherwise -> []
-  variants r = [(values r, inertUpTo 160 (long r)), (values r, inertUpTo 80 (short r)), (briefly r, inertUpTo 80 (short r))]
+  variants r =
+    [ (values r, inertUpTo 160 (long r))
+    , (values r, inertUpTo 80 (arrows (short r)))
+    , (briefly r, inertUpTo 80 (arrows (short r)))
+    , (briefly r, inertUpTo 80 (arrows (take 1 (short r))))
+    ]
   values r = inertUpTo 120 (intercalate " → " (fst (partsOf r)))
   -- Without the values before.
   briefly r = values r {reactionChanges = [c {changeBefore = Nothing} | c <- reactionChanges r]}
   partsOf r = uncurry reactionParts (names r) r
   long r = arrows (snd (partsOf r))
-  short r = arrows ([stoppedText (map fst (fst (names r))) b | Just b <- [reactionStopped r]] ++ startsText (snd (names r)) r)
+  short r = [stoppedText (map fst (fst (names r))) b | Just b <- [reactionStopped r]] ++ startsText (snd (names r)) r
   arrows = unwords . map ("→ " ++)
 
 diamond :: Double -> Double -> Text
