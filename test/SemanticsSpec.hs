@@ -92,7 +92,9 @@ slipping some = do
 -- | Worlds for situations that random worlds rarely have.
 rareWorlds :: [World]
 rareWorlds =
-  [ -- The timeout expires while the operator inside stops its branches after its verdict.
+  [ -- The timeout expires as its action ends, after which the next one fails at once.
+    alone (Timeout 1 (uninterruptible 1 "a" `Then` FirstOf []))
+  , -- The timeout expires while the operator inside stops its branches after its verdict.
     alone (Timeout 2 (FirstOf [act 1 "a" Fails StopsAtOnce, act 9 "b" Fails (StopsAfter 2)]))
   , -- The task completes despite the stop request, while the condition becomes false again.
     (alone (Monitor (Watched "p") (act 1 "r" Fails StopsAtOnce) (act 9 "t" Fails (EndsAfter 1 (Succeeds 7)))))

@@ -84,16 +84,20 @@ opened t p = case p of
   following source = Reacting p source (viewOf t source) (Choosing FirstRead)
 
 andThen, orElse :: Now -> Running -> Program -> Running
-andThen t (Over (Succeeded _)) second = begin t second
+andThen t (Over (Succeeded _)) second = next t second
 andThen _ (Over other) _ = Over other
 andThen _ first second = first `AndThen` second
-orElse t (Over (Failed _)) second = case begin t second of
-  -- What fails at once does so after the first's failure has been caught: there a request is received
-  -- that the first did not receive.
-  Over (Failed _) -> Starting second
-  begun -> begun
+orElse t (Over (Failed _)) second = next t second
 orElse _ (Over other) _ = Over other
 orElse _ first second = first `OrElse` second
+
+-- | What runs after something else. If it fails at once, that is after the first has ended: there a request is
+-- received that the first did not receive. (And one that comes only then, as in reality; the simulator has no
+-- scheduling point there.)
+next :: Now -> Program -> Running
+next t second = case begin t second of
+  Over (Failed _) -> Starting second
+  begun -> begun
 
 ended :: Name -> Ending -> Result
 ended name = \case
