@@ -16,7 +16,7 @@ help:
 	@echo 'make bench     what it costs, and whether the targets are met (KEEP=1 keeps the ratios;'
 	@echo '               make bench-check compares with those that are kept)'
 	@echo 'make soak      more random schedules and programs (SECONDS=600 for ten minutes)'
-	@echo 'make signals   SIGINT and SIGTERM at 1,000 random moments each (MOMENTS=100 for fewer)'
+	@echo 'make signals   SIGINT, SIGTERM, SIGHUP at 1,000 random moments each (MOMENTS=100 for fewer)'
 	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
 	@echo 'make attacks   programs that try to break the promises (NAMES="Storm" selects)'
 	@echo 'make mutants   small mistakes in the sources, which the tests must detect (NAMES="debounce" selects)'

@@ -18,7 +18,6 @@ import Control.Exception
   , mask_
   , throwIO
   , try
-  , uninterruptibleMask_
   )
 import Control.Monad (forever, unless, void)
 import qualified Data.Map.Strict as Map
@@ -29,7 +28,7 @@ import Behavior.Parallel (firstOf, fork, scoped)
 import Behavior.STM
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior.Time (cleanupWithin, timeout)
 
 data Mode = Auto | Manual | Park
   deriving (Eq, Show)
@@ -195,4 +194,4 @@ withMotors r act = (motorsOn r >> act) `finallyAlways` motorsOff r
 -- | 'finally' for a cleanup that takes time, such as parking the arm. Nothing must interrupt
 -- it: neither the emergency stop nor the battery.
 finallyAlways :: Behavior a -> Behavior () -> Behavior a
-finallyAlways act cleanup = act `finally` uninterruptibleMask_ cleanup
+finallyAlways act cleanup = act `finally` cleanupWithin (1 / 0) cleanup

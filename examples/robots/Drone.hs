@@ -9,7 +9,7 @@ module Drone
   , survey
   ) where
 
-import Control.Exception (bracket_, displayException, uninterruptibleMask_)
+import Control.Exception (bracket_, displayException)
 import Control.Monad (forever)
 import Data.List (intercalate)
 
@@ -17,7 +17,7 @@ import Behavior
 import Behavior.STM
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior.Time (cleanupWithin, timeout)
 
 type Waypoint = String
 
@@ -41,7 +41,7 @@ data Drone = Drone
 -- interrupts that. With @land@ as the emergency of 'Signal.insteadWhen', a cancellation could stop it
 -- in the air.
 drone :: Drone -> Behavior ()
-drone robot = bracket_ (motorsOn robot) (uninterruptibleMask_ (land robot >> motorsOff robot)) $
+drone robot = bracket_ (motorsOn robot) (cleanupWithin (1 / 0) (land robot >> motorsOff robot)) $
   Signal.insteadWhen (strongWind robot) (logLine robot "strong wind: land here") $ do
     takeOff robot
     Signal.insteadWhen (batteryLow robot) (logLine robot "the battery is low: fly home") $

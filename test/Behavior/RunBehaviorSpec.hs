@@ -9,10 +9,11 @@ module Behavior.RunBehaviorSpec (spec) where
 import Control.Concurrent
 import Control.Concurrent.Async (asyncThreadId, poll, wait, waitCatchSTM, withAsyncBound)
 import Control.Exception
-import Control.Monad (join, replicateM, replicateM_, void, when)
+import Control.Monad (join, replicateM, replicateM_, unless, void, when)
 import Data.Either (fromLeft)
 import Data.Foldable (for_)
 import Data.Maybe (isNothing)
+import Foreign.C (CInt (..))
 import GHC.Conc (ThreadStatus (..), threadStatus)
 import System.Exit (ExitCode (..))
 import System.IO (hFlush, stdout)
@@ -38,7 +39,7 @@ spec = guarded . describe "runBehavior" $ do
     end `shouldBe` Gave (False, Unmasked)
     events `shouldBe` [Started (Label "runBehavior" "program"), Ended (Label "runBehavior" "program")]
 
-  for_ [(sigINT, sigTERM, "SIGINT", 130), (sigTERM, sigINT, "SIGTERM", 143)] $ \(signal, otherSignal, name, code) -> do
+  for_ endings $ \(signal, otherSignal, name, code) -> around_ (unignored signal) $ do
     it ("ends with " ++ show code ++ " after a " ++ name ++ ", when the cleanups have ended") $ do
       entries <- newLog
       cleaning <- newGate
@@ -75,9 +76,13 @@ spec = guarded . describe "runBehavior" $ do
           raiseSignal signal
           takeMVar received
 
-    it ("ends the process at once at a second " ++ name ++ ", even during a cleanup") $
+    unless (signal == sigHUP) . it ("ends the process at once at a second " ++ name ++ ", even during a cleanup") $
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal signal >> hang)))
         >>= (`shouldBe` Terminated signal False)
+
+    it ("does not end the process at a SIGHUP after a " ++ name ++ ": the cleanup runs to its end") $
+      inChild (byDefault sigHUP >> runBehavior (uninterruptibly (raiseSignal signal >> hang) (installed sigHUP >>= replicateM_ 2)))
+        >>= (`shouldBe` Exited (ExitFailure code))
 
     it ("ends the process at once at a signal of the other kind after a " ++ name) $
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal otherSignal >> hang)))
@@ -173,6 +178,13 @@ spec = guarded . describe "runBehavior" $ do
       inChild (runBehavior (raiseSignal signal >> hang))
         >>= (`shouldBe` Exited (ExitFailure code))
 
+  around_ (unignored sigHUP) . it "leaves a SIGHUP ignored that is ignored when it begins" $ do
+    _ <- installHandler sigHUP Ignore Nothing
+    for_ [runBehavior, runBehavior . runBehavior] $ \run ->
+      run (installHandler sigHUP Ignore Nothing) >>= \case
+        Ignore -> pure ()
+        _ -> expectationFailure "a handler is installed"
+
   it "waits for an action in runInBoundThread, which nothing interrupts" $
     when rtsSupportsBoundThreads $ do
       entries <- newLog
@@ -216,6 +228,7 @@ spec = guarded . describe "runBehavior" $ do
       open found
       end `shouldBe` FaultedWith (show BlockedIndefinitelyOnMVar)
  where
+  endings = [(sigINT, sigTERM, "SIGINT", 130), (sigTERM, sigINT, "SIGTERM", 143), (sigHUP, sigTERM, "SIGHUP", 129)]
   isBlocked = \case
     ThreadBlocked _ -> True
     _ -> False
@@ -229,6 +242,15 @@ installed signal = do
   case there of
     Catch act -> pure act
     _ -> throwIO (ErrorCall "no handler")
+
+-- | Runs the example without what has been set by the program that started the tests: nohup ignores
+-- SIGHUP.
+unignored :: Signal -> IO () -> IO ()
+unignored signal = bracket (ignores signal <* byDefault signal) restore . const
+ where
+  restore ignored = void (installHandler signal (if ignored == 0 then Default else Ignore) Nothing)
+
+foreign import ccall unsafe "behavior_lang_ignores" ignores :: Signal -> IO CInt
 
 byDefault :: Signal -> IO ()
 byDefault signal = void (installHandler signal Default Nothing)

@@ -9,9 +9,9 @@
 -- (The default is 20.)
 --
 -- Each moment has a process of its own, and its end is awaited. The process must end with
--- 130 after a SIGINT and with 143 after a SIGTERM (as a shell shows it: a process that was
--- ended by a signal has the status 128 + the number of the signal), and each action that
--- had begun must have run its cleanup.
+-- 130 after a SIGINT, with 143 after a SIGTERM and with 129 after a SIGHUP (as a shell shows it:
+-- a process that was ended by a signal has the status 128 + the number of the signal), and each
+-- action that had begun must have run its cleanup.
 module Main (main) where
 
 import Control.Concurrent (forkIO, newEmptyMVar, putMVar, takeMVar, threadDelay)
@@ -27,7 +27,7 @@ import System.Exit (ExitCode (..), die, exitFailure)
 import System.IO (BufferMode (..), hGetChar, hGetContents, hSetBuffering, stdout)
 import System.Posix.IO (closeFd, createPipe, dupTo, fdToHandle, fdWrite, stdOutput)
 import System.Posix.Process (ProcessStatus (..), executeFile, forkProcess, getProcessStatus)
-import System.Posix.Signals (Signal, sigINT, sigKILL, sigTERM, signalProcess)
+import System.Posix.Signals (Handler (Default), Signal, installHandler, sigHUP, sigINT, sigKILL, sigTERM, signalProcess)
 import System.Timeout (timeout)
 
 import Behavior (Behavior, runBehavior, sleep)
@@ -68,7 +68,7 @@ attack n = do
   settings =
     [ (name, signal, capabilities)
     | (name, _) <- programs
-    , signal <- [(sigINT, "SIGINT"), (sigTERM, "SIGTERM")]
+    , signal <- [(sigINT, "SIGINT"), (sigTERM, "SIGTERM"), (sigHUP, "SIGHUP")]
     , capabilities <- [1, 2]
     ]
 
@@ -93,6 +93,8 @@ moment name capabilities signal delay = do
     void (dupTo input stdOutput)
     closeFd output
     closeFd input
+    -- (Under nohup it is ignored.)
+    _ <- installHandler sigHUP Default Nothing
     executeFile self False ["child", name, "+RTS", "-N" ++ show capabilities] Nothing
   closeFd input
   marks <- fdToHandle output

@@ -3,7 +3,7 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Handling SIGINT and SIGTERM, which belong to the whole process.
+-- Handling SIGINT, SIGTERM and SIGHUP, which belong to the whole process.
 --
 -- GHC calls a handler in a new thread, some time after the signal: by then the run that
 -- installed it may have ended, and another may have begun. So there is a single handler for
@@ -18,6 +18,10 @@
 --     the default. So where the default was installed before, this handler stays installed,
 --     and does (B).
 --
+-- Two things are special about SIGHUP. Where it is ignored when the first run begins (by nohup),
+-- it stays ignored. And a second one has no effect: when a terminal is closed, the shell and the
+-- kernel send one each.
+--
 -- Internal: any of it may change in any release.
 module Behavior.Internal.ProcessSignals
   ( withSignals
@@ -27,34 +31,35 @@ module Behavior.Internal.ProcessSignals
 import Control.Concurrent.STM (STM, retry)
 
 -- | Runs the action with a transaction that waits for a signal. (On Windows it waits for ever.)
-withSignals :: (STM Int -> IO a) -> IO a
+withSignals :: (STM (String, Int) -> IO a) -> IO a
 withSignals act = act retry
 #else
 import Control.Concurrent.MVar (MVar, modifyMVar, modifyMVar_, newMVar)
 import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Concurrent.STM.TVar (mkWeakTVar)
 import Control.Exception (bracket, uninterruptibleMask_)
-import Control.Monad (void, (>=>))
+import Control.Monad (filterM, void, (>=>))
 import Data.Foldable (for_)
 import Data.Maybe (catMaybes)
 import Data.Traversable (for)
+import Foreign.C (CInt (..))
 import System.IO.Unsafe (unsafePerformIO)
 import System.Mem.StableName (eqStableName, makeStableName)
 import System.Mem.Weak (Weak, deRefWeak)
 import System.Posix.Process (getProcessID)
-import System.Posix.Signals (Handler (..), Signal, installHandler, raiseSignal, sigINT, sigTERM)
+import System.Posix.Signals (Handler (..), Signal, installHandler, raiseSignal, sigHUP, sigINT, sigTERM)
 import System.Posix.Types (ProcessID)
 
 import Behavior.Internal.Runtime (atomically)
 
--- | Runs the action with a transaction that waits for a signal, and gives the exit code
--- for it. A signal that was received while the action ran, but was not taken by that
+-- | Runs the action with a transaction that waits for a signal, and gives its name and the
+-- exit code for it. A signal that was received while the action ran, but was not taken by that
 -- transaction, is raised again when the action has ended.
-withSignals :: (STM Int -> IO a) -> IO a
+withSignals :: (STM (String, Int) -> IO a) -> IO a
 withSignals act = bracket enter leave $ \(_, state) ->
   act $
     readTVar state >>= \case
-      Received signal -> exitCode signal <$ writeTVar state Taken
+      Received signal -> (nameOf signal, exitCode signal) <$ writeTVar state Taken
       _ -> retry
 
 -- | Whether a run has received a signal.
@@ -74,7 +79,7 @@ data Process = Process
   , pending :: Maybe Signal
   -- ^ The signal that the runs have received, unless one of them has taken it.
   , defaulted :: Bool
-  -- ^ Whether the first signal has come: the next ends the process at once.
+  -- ^ Whether the first signal has come: the next SIGINT or SIGTERM ends the process at once.
   , owner :: Maybe ProcessID
   -- ^ The process that these runs belong to.
   }
@@ -105,7 +110,8 @@ enter = do
     pure (installed {runs = (n, weakly) : runs installed}, (n, state))
  where
   install known = do
-    old <- for handlers $ \(signal, handler) -> do
+    handled <- filterM (fmap not . isIgnoredHangup . fst) handlers
+    old <- for handled $ \(signal, handler) -> do
       handlerBefore <- installHandler signal handler Nothing
       -- (C)
       stayed <- isOurs signal handlerBefore
@@ -133,11 +139,11 @@ received signal = uninterruptibleMask_ . modifyMVar_ process $ here >=> \known -
     -- (B)
     [] -> known <$ passOn signal
     _
-      -- It came together with the first one, before the default was installed.
+      -- It is a SIGHUP, or came together with the first one, before the default was installed.
       | defaulted known -> pure known
       | otherwise -> do
           atomically (for_ there (`writeTVar` Received signal))
-          for_ handlers $ \(each, _) -> installHandler each Default Nothing
+          for_ [sigINT, sigTERM] $ \each -> installHandler each Default Nothing
           pure known {pending = Just signal, defaulted = True}
 
 -- | Raises the signal for the handler that is installed; if that is ours, the default was
@@ -162,14 +168,32 @@ isOurs signal there = case (lookup signal handlers, there) of
 
 -- | The handlers of this module. (Evaluated once, so that they can be compared.)
 handlers :: [(Signal, Handler)]
-handlers = [(sigINT, Catch onInterrupt), (sigTERM, Catch onTermination)]
+handlers = [(sigINT, Catch onInterrupt), (sigTERM, Catch onTermination), (sigHUP, Catch onHangup)]
 {-# NOINLINE handlers #-}
 
-onInterrupt, onTermination :: IO ()
+onInterrupt, onTermination, onHangup :: IO ()
 onInterrupt = received sigINT
 onTermination = received sigTERM
+onHangup = received sigHUP
 {-# NOINLINE onInterrupt #-}
 {-# NOINLINE onTermination #-}
+{-# NOINLINE onHangup #-}
+
+-- | Whether it is SIGHUP, and the process ignores it.
+isIgnoredHangup :: Signal -> IO Bool
+isIgnoredHangup signal
+  | signal == sigHUP = (/= 0) <$> ignores signal
+  | otherwise = pure False
+
+-- | Whether the process ignores the signal: 1 or 0.
+foreign import ccall unsafe "behavior_lang_ignores" ignores :: CInt -> IO CInt
+
+-- | The name of a signal that is handled here.
+nameOf :: Signal -> String
+nameOf signal
+  | signal == sigINT = "SIGINT"
+  | signal == sigTERM = "SIGTERM"
+  | otherwise = "SIGHUP"
 
 -- | The exit code that a shell shows for a process that was ended by the signal.
 exitCode :: Signal -> Int

@@ -22,14 +22,17 @@ import Behavior.Internal.Trace.Event (Cause (..))
 --
 -- * It runs in an unbound thread. In the thread of @main@, which is bound, operators take ten
 --   times as long: each thread switch would be a system call.
--- * The first SIGINT (Ctrl-C) or SIGTERM cancels the behaviour. When that has
---   ended, cleanup included, the process ends with 130 or 143. A second signal ends
---   it at once.
+-- * The first SIGINT (Ctrl-C), SIGTERM or SIGHUP (a terminal or ssh session was closed)
+--   cancels the behaviour. When that has ended, cleanup included, the process ends with 130,
+--   143 or 129. A second SIGINT or SIGTERM ends it at once; a second SIGHUP does not, because
+--   a terminal that is closed sends two. Where SIGHUP is ignored when the behaviour begins
+--   (@nohup@), it stays ignored. After it the terminal is gone and printing throws an
+--   'System.IO.Error.IOError': a cleanup that prints before it stops the motors does not stop them.
 --
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
 -- instead of the exit. A signal that comes too late to cancel the behaviour is raised
 -- again, for the handler that was installed before: no signal is without effect. (After the
--- behaviour, SIGINT and SIGTERM have the effect that they had before it. If that was the
+-- behaviour, these signals have the effect that they had before it. If that was the
 -- default, a handler of this library does it, so 'System.Posix.Signals.installHandler'
 -- returns that handler.)
 --
@@ -49,9 +52,9 @@ import Behavior.Internal.Trace.Event (Cause (..))
 --
 -- @since 0.1.0.0
 runBehavior :: Behavior a -> IO a
-runBehavior behavior = withSignals $ \exitCode ->
+runBehavior behavior = withSignals $ \signal ->
   structured "runBehavior" $ \scope -> do
     program <- branch scope (Label "runBehavior" "program") behavior
-    atomically $ (endedBy "program" <$> outcome program) `orElse` (stopped <$> exitCode)
+    atomically $ (endedBy "program" <$> outcome program) `orElse` (stopped <$> signal)
  where
-  stopped code = Verdict (FromOutside (if code == 130 then "SIGINT" else "SIGTERM")) (throwIO (ExitFailure code))
+  stopped (name, code) = Verdict (FromOutside name) (throwIO (ExitFailure code))

@@ -54,7 +54,7 @@ nothing = Viewing {traceFile = Nothing, timelineFile = Nothing, liveTree = False
 -- | Runs a behaviour in a trace ('withTrace'), and shows it.
 --
 -- [Result, failure, fault, cancellation] Those of the behaviour. The files are written however it ends,
---   also by SIGINT or SIGTERM under 'Behavior.runBehavior'.
+--   also by SIGINT, SIGTERM or SIGHUP under 'Behavior.runBehavior'.
 -- [Fault] If a file cannot be created or written, the behaviour runs nevertheless; when it has returned, this
 --   throws the 'IOException', which names the file. (Of two files, one is reported on @stderr@.) If the
 --   behaviour throws, that goes on, and all such files are reported on @stderr@.
