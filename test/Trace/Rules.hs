@@ -370,10 +370,9 @@ values x =
           _ -> True
     levels -> case p of
       -- (Equal changes are reported once.)
-      TeleoReactive rules -> length levels < length rules || Just (firstToHold (map snd levels)) /= (firstToHold <$> traverse fst levels)
+      TeleoReactive _ -> not (null levels) && (not (direct p) || and [holds (read was) /= holds (read now) | (Just was, now) <- levels])
       Timeout _ _ -> null levels
       _ -> False
-  firstToHold = length . takeWhile (not . holds . read)
   isTeleoReactive = \case TeleoReactive _ -> True; _ -> False
   direct p = not (any (`isInfixOf` show (signalsOf p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
   signalsOf = \case

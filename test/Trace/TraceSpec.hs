@@ -8,7 +8,7 @@ import Control.Concurrent (forkIO, yield)
 import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception
 import Control.Monad (void)
-import Data.Foldable (for_)
+import Data.Foldable (for_, traverse_)
 import Data.IORef (modifyIORef', newIORef, readIORef, writeIORef)
 import Data.List (isPrefixOf)
 import Data.Maybe (fromMaybe, listToMaybe)
@@ -255,6 +255,38 @@ reactions = do
     level <- newTVarIO False
     (_, seen) <- traceOf (Signal.insteadWhen (Signal.watching (readTVar level)) (pure ()) (atomically (writeTVar level True) >> hang))
     [reactionChanges r | Reacted r <- seen] `shouldBe` [[Change "condition" (Just "False") "True"]]
+
+  it "shows names and values also of signals that were shared before the trace began" $
+    for_ [("a signal", id), ("a filter", Signal.debounce 0), ("a filter that remembers", fmap (> 0) . Signal.changes)] $ \(_ :: String, filtered) -> do
+      let watched level = Signal.named "low" (filtered ((< 10) <$> Signal.named "battery" (Signal.watching (readTVar level))))
+          drive level low = Signal.insteadWhen low (pure ()) (atomically (writeTVar level 5) >> hang)
+          changed (_, seen) = [reactionChanges r | Reacted r <- seen]
+      level <- newTVarIO (100 :: Int)
+      inside <- changed <$> Signal.withShared (watched level) (traceOf . drive level)
+      atomically (writeTVar level 100)
+      around' <- changed <$> traceOf (Signal.withShared (watched level) (drive level))
+      inside `shouldBe` [[Change "battery" (Just "100") "5", Change "low" (Just "False") "True"]]
+      around' `shouldBe` inside
+
+  it "names of ordered rules those whose conditions have changed, and decide" $ do
+    run <- simulateWith defaults $ do
+      danger <- newTVarIO (0 :: Int)
+      order <- newTVarIO 0
+      rain <- newTVarIO 0
+      let rule name variable = Signal.named name ((> 0) <$> Signal.named (name ++ " level") (Signal.watching (readTVar variable)))
+          changing = for_ [[(order, 1)], [(rain, 5), (danger, 1)], [(order, 2), (rain, 7)], [(danger, 0)], [(order, 0)], [(rain, 0)]] $ \sets ->
+            sleep 1 >> atomically (traverse_ (uncurry writeTVar) sets)
+      Signal.teleoReactive [(rule "danger" danger, hang), (rule "order" order, hang), ((> 0) <$> Signal.watching (readTVar rain), hang), (pure True, hang)]
+        ||| (changing >> sleep 1)
+    let changedTo :: String -> Int -> Int -> [Change]
+        changedTo name was now = [Change (name ++ " level") (Just (show was)) (show now), Change name (Just (show (was > 0))) (show (now > 0))]
+    [(reactionChanges r, reactionStarts r) | Reacted r <- events run]
+      `shouldBe` [ (changedTo "order" 0 1, Just "rule 2")
+                 , (changedTo "danger" 0 1, Just "rule 1")
+                 , (changedTo "danger" 1 0, Just "rule 2")
+                 , (changedTo "order" 2 0, Just "rule 3")
+                 , ([Change "condition 3" (Just "True") "False"], Just "rule 4")
+                 ]
 
 tracing :: Spec
 tracing = do

@@ -164,7 +164,7 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
   Just n -> Run ("rule " ++ show (n + 1)) (snd (rules !! n))
  where
   firstHolding = findIndex id <$> traverse conditionOf (zip [1 :: Int ..] rules)
-  conditionOf (n, (condition, _)) = suppressEqual (unlessNamed ("condition " ++ show n) condition)
+  conditionOf (n, (condition, _)) = suppressEqual (conditionOfRule n condition)
 
 -- | Waits until the condition holds; returns at once if it does.
 --

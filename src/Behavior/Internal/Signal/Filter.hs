@@ -21,6 +21,7 @@ import Control.Monad (forever, unless, when)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Seconds (duration, moment)
 import Behavior.Internal.Signal.Source
+import Behavior.Internal.Trace.Decision (Reading)
 
 -- $setup
 -- >>> import Behavior

@@ -12,6 +12,7 @@ module Behavior.Internal.Signal.Source
   , named
   , namedWith
   , unlessNamed
+  , conditionOfRule
 
     -- * Opening
   , Demand (..)
@@ -23,7 +24,6 @@ module Behavior.Internal.Signal.Source
   , Source (..)
   , fromView
   , View (..)
-  , Reading
   , ReadMode (..)
   , readView
   , constantView
@@ -43,6 +43,7 @@ import Data.Traversable (for)
 import Behavior.Internal.Failure (failWith)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
+import Behavior.Internal.Trace.Decision (Reading (..))
 import Behavior.Internal.Trace.Place (isTraced)
 
 -- $setup
@@ -139,9 +140,6 @@ data View a = View
   -- read the value.
   }
 
--- | The name of a signal, and the text of its value.
-type Reading = (String, String)
-
 instance Functor View where
   fmap f = mapView (fmap f)
 
@@ -219,20 +217,32 @@ named name = namedWith name show
 -- @since 0.1.0.0
 namedWith :: String -> (a -> String) -> Signal a -> Signal a
 namedWith name render signal = Signal $ \demand -> do
-  source <- open signal demand >>= showing name render
-  pure source {names = [name]}
-
--- | The source whose readings include its value, if there is a trace, which needs them.
-showing :: String -> (a -> String) -> Source a -> IO (Source a)
-showing name render source = isTraced >>= \traced -> pure $! if traced then source {view = shown <$> view source} else source
- where
-  shown seen = seen {readings = (\before a -> before ++ [(name, render a)]) <$> readings seen <*> reread seen}
-
--- | The condition, whose readings include its value under this name, if there is no other name.
-unlessNamed :: String -> Signal Bool -> Signal Bool
-unlessNamed name signal = Signal $ \demand -> do
   source <- open signal demand
-  if null (names source) then showing name show source else pure source
+  -- (Also without a trace: it may begin while the source is open, in 'Behavior.Signal.withShared'.)
+  pure source {view = showing name render <$> view source, names = [name]}
+
+-- | The condition, whose readings include its value under this name, if there is no other name. (An
+-- operator opens it, which is in a trace from its beginning or not at all.)
+unlessNamed :: String -> Signal Bool -> Signal Bool
+unlessNamed name = inTrace $ \source ->
+  if null (names source) then source {view = showing name show <$> view source} else source
+
+-- | The condition of the rule with this number, whose readings say so.
+conditionOfRule :: Int -> Signal Bool -> Signal Bool
+conditionOfRule n = inTrace (\source -> source {view = ofRule <$> view source}) . unlessNamed ("condition " ++ show n)
+ where
+  ofRule seen = seen {readings = (\holds -> map (\r -> r {readingRule = Just (n, holds)})) <$> reread seen <*> readings seen}
+
+-- | The signal, whose source is changed if there is a trace when it is opened.
+inTrace :: (Source a -> Source a) -> Signal a -> Signal a
+inTrace change signal = Signal $ \demand -> do
+  source <- open signal demand
+  traced <- isTraced
+  pure $! if traced then change source else source
+
+-- | The view whose readings include its value.
+showing :: String -> (a -> String) -> View a -> View a
+showing name render seen = seen {readings = (\before a -> before ++ [Reading name (render a) Nothing]) <$> readings seen <*> reread seen}
 
 -- | The threads that run for a source, from left to right.
 type Sensors = [Branch ()]

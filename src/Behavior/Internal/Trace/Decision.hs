@@ -6,6 +6,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Trace.Decision
   ( Values
+  , Reading (..)
   , Ran
   , branchBegins
 
@@ -36,8 +37,17 @@ import Behavior.Internal.Trace.Event
 import Behavior.Internal.Trace.Place
 import Behavior.Internal.Trace.Span (newNumber, parentFor, reportEach)
 
--- | The names of signals, and the texts of their values.
-type Values = [(String, String)]
+-- | The named values with which an operator decided.
+type Values = [Reading]
+
+-- | A value of a signal that has a name.
+data Reading = Reading
+  { readingName :: String
+  , readingText :: String
+  , readingRule :: !(Maybe (Int, Bool))
+  -- ^ If it is one of ordered rules whose condition is made of the value: the number of the rule, and whether
+  -- the condition holds.
+  }
 
 -- | A branch, and when it began.
 data Ran = Ran String !Seconds
@@ -82,16 +92,19 @@ decide here operator branch before after = do
   pure (Decision (SignalChanged n changes) after (Just (Unreported here branch reaction)))
 
 -- | What the values were before, and are now. (Several signals may have the same name: then the first
--- belongs to the first, and so on.)
+-- belongs to the first, and so on.) Of ordered rules, those whose conditions have changed, up to the first rule
+-- that holds now: the ones after it decide nothing.
 changesBetween :: Values -> Values -> [Change]
 changesBetween before after =
-  nub [Change name (Map.lookup key was) value | (key@(name, _), value) <- numbered after]
+  nub [Change (readingName r) (readingText <$> Map.lookup key was) (readingText r) | (key, r) <- numbered after, decides (Map.lookup key was) r]
  where
   was = Map.fromList (numbered before)
+  decides old r = maybe True (\(n, _) -> (old >>= readingRule) /= readingRule r && n <= firstHolding) (readingRule r)
+  firstHolding = minimum (maxBound : [n | Reading {readingRule = Just (n, True)} <- after])
   numbered = snd . mapAccumL number Map.empty
-  number seen (name, value) =
-    let n = Map.findWithDefault (0 :: Int) name seen
-     in (Map.insert name (n + 1) seen, ((name, n), value))
+  number seen r =
+    let n = Map.findWithDefault (0 :: Int) (readingName r) seen
+     in (Map.insert (readingName r) (n + 1) seen, ((readingName r, n), r))
 
 -- | There is no change to report: the operator begins, or there is no trace.
 begins :: Values -> Decision

@@ -124,7 +124,7 @@ data Reaction = Reaction
   -- ^ When the operator decided.
   , reactionChanges :: [Change]
   -- ^ The named values of the signal, those it is computed from first. All were read in the
-  -- transaction that decided.
+  -- transaction that decided. (Of ordered rules, only those of the conditions that have changed.)
   , reactionStopped :: !(Maybe StoppedBranch)
   -- ^ The branch that was stopped; nothing if the operator was waiting.
   , reactionStarts :: Maybe String
