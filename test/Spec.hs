@@ -44,6 +44,7 @@ import qualified Examples.PickAndPlaceSpec
 import qualified Examples.ProgressProblemSpec
 import qualified Examples.TestingARobotSpec
 import qualified Examples.YourOwnMonadSpec
+import qualified OrdinaryWordsSpec
 import qualified Paper.DoorsSpec
 import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
@@ -122,6 +123,7 @@ main = hspec $ do
   describe "Reality" Reality.RealitySpec.spec
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
   describe "Specification" SemanticsSpec.spec
+  describe "Names" OrdinaryWordsSpec.spec
   describe "Traces of random programs" $ do
     Trace.ProgramsSpec.spec
     Trace.MessagesSpec.spec

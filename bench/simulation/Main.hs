@@ -24,7 +24,7 @@ main = runInUnboundThread $ do
   case arguments of
     [] -> speed
     ["memory", "random"] -> memory "random" (randomly most)
-    ["memory", "exhaustive"] -> memory "exhaustive" (exhaustively 5) {search = Exhaustive 5 most}
+    ["memory", "exhaustive"] -> memory "exhaustive" (exhaustively 5) {planSearch = Exhaustive 5 most}
     _ -> die "usage: simulation [memory (random | exhaustive)]"
  where
   most = 1000000
@@ -35,18 +35,18 @@ speed = do
     turn <- newTVarIO True
     let player mine = forM_ [1 .. 100000 :: Int] $ \_ ->
           atomically (readTVar turn >>= check . (== mine) >> writeTVar turn (not mine))
-    points <$> simulateWith tireless (both (player True) (player False))
+    runPoints <$> simulateWith tireless (both (player True) (player False))
   perSecond "scheduling points, one thread" $
-    points <$> simulateWith tireless (forM_ [1 .. 1000000 :: Int] (const checkpoint))
+    runPoints <$> simulateWith tireless (forM_ [1 .. 1000000 :: Int] (const checkpoint))
   perSecond "scheduling points, random schedules" $
-    sum <$> mapM (fmap points . scheduledBy) [1 .. 5000]
+    sum <$> mapM (fmap runPoints . scheduledBy) [1 .. 5000]
   perSecond "random schedules of a small mission" $
     length <$> mapM scheduledBy [1 .. 5000]
   (_, day) <- timed (simulate aDay)
   line "a simulated day" day
  where
-  tireless = defaults {livelockLimit = maxBound}
-  scheduledBy seed = simulateWith defaults {scheduled = Seeded seed} mission
+  tireless = defaultSimOptions {livelockLimit = maxBound}
+  scheduledBy seed = simulateWith defaultSimOptions {scheduled = Seeded seed} mission
   aDay = Signal.monitor ((< 0) <$> Signal.polling 1 (pure (1 :: Int))) (pure ()) (forM_ [1 .. 1000 :: Int] (const (sleep 86.4)))
 
 -- | The live memory after 20,000 schedules and after 200,000, and the highest resident memory.

@@ -17,7 +17,7 @@ import System.Exit (ExitCode (..))
 import Behavior
 import Behavior.Parallel (firstOf)
 import Behavior.STM (readTVarIO)
-import Behavior.Sim (Outcome (..), Run (..), Schedule, defaults, explain, simulateWith)
+import Behavior.Sim (Outcome (..), Run (..), Schedule, defaultSimOptions, explain, simulateWith)
 import qualified Behavior.Sim as Sim
 import Behavior.Trace (Event, named)
 import WorldChange
@@ -133,7 +133,7 @@ simulatedWithEvents o schedule' = do
  where
   notOver report run = pure (report ++ [inWords NotOver], Nothing, events run)
   options' =
-    defaults
+    defaultSimOptions
       { Sim.scheduled = schedule'
       , Sim.endAt = 3600 -- takes a few seconds of real time
       , Sim.realTimeLimit = 1 / 0 -- the user can press Ctrl-C

@@ -12,7 +12,7 @@ import Behavior
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Message (withInbox)
-import Behavior.Sim (Outcome (Returned), Run (..), defaults, endAt, explain, simulateWith)
+import Behavior.Sim (Outcome (Returned), Run (..), defaultSimOptions, endAt, explain, simulateWith)
 import Behavior.Sim.Mock (begin, condition, driver, newMock, set, signal)
 import Behavior.Trace (named)
 import Behavior.Trace.Viewing (Viewing (..), viewEvents, viewing)
@@ -34,7 +34,7 @@ main = do
   runBehavior $
     if inSimulation o
       then do
-        run <- simulateWith defaults {endAt = 3600} mission
+        run <- simulateWith defaultSimOptions {endAt = 3600} mission
         viewEvents (shown o) (events run)
         case outcome run of
           Returned () -> pure ()

@@ -75,8 +75,8 @@ asHspec (SomeException e) = case cast e of
 -- | Expects that the rover is home and charged at this time, if the button is not pressed.
 charged :: Seconds -> Plan -> IO Report
 charged time plan =
-  explore plan {showException = asHspec} $ \simulated ->
+  explore plan {planShowException = asHspec} $ \simulated ->
     trial goHome [(0, False)] (simulated >=> \run -> finished run `shouldBe` time)
 
 motorOnly :: Plan
-motorOnly = (exhaustively 0) {selectSteps = mentioning ["motor runs"]}
+motorOnly = (exhaustively 0) {planSelectSteps = mentioning ["motor runs"]}

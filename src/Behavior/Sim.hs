@@ -64,7 +64,7 @@
 --   names what to use instead. (A wait of less than half a second is not detected. Neither is
 --   'System.Timeout.timeout' around a simulated operation: it counts real time.) Printing is
 --   fine, as long as the output is read.
--- * Computing takes no virtual time, and timers are exact, unless 'slip' is set.
+-- * Computing takes no virtual time, and timers are exact, unless 'timerSlip' is set.
 -- * Your own clocks, random numbers and finalizers are not simulated.
 --
 -- A loop that never allocates cannot be stopped: the process hangs, as it would without a
@@ -77,8 +77,8 @@ module Behavior.Sim
   ( -- * One run
     simulate
   , simulateWith
-  , Options (..)
-  , defaults
+  , SimOptions (..)
+  , defaultSimOptions
   , Schedule (..)
 
     -- * The result of a run

@@ -49,7 +49,7 @@ spec = guarded . describe "abandoning" $ do
         sleep 1
         counted
       readIORef counts `shouldReturn` [(3.5, 0), (2.5, 1), (2, 1)]
-      [(at step, text) | step@Step {did = Note text} <- steps run, "abandoning" `isInfixOf` text]
+      [(stepTime step, text) | step@Step {stepKind = Note text} <- steps run, "abandoning" `isInfixOf` text]
         `shouldBe` [ (2, "abandoning: a behaviour that has not ended 1.0 s after its stop was requested is abandoned, and still runs")
                    , (3, "abandoning: a behaviour that was abandoned has ended with " ++ show (Fault "arm"))
                    ]
@@ -145,7 +145,7 @@ landedAt filming = do
   let film = uninterruptibleMask_ (sleep 1000)
       land = sleep 4 >> now >>= writeIORef landed . Just
       wind = sleep 5 >> atomically (writeTVar windy True)
-  _ <- simulateWith defaults {endAt = 100} $
+  _ <- simulateWith defaultSimOptions {endAt = 100} $
     Signal.insteadWhen (watchedVar windy) land (filming film `both` hang) `both` wind
   readIORef landed
 

@@ -58,7 +58,7 @@ asking = do
       returned run ()
       counts <- map (length . catMaybes) <$> asked
       unless (head counts == 0 && last counts == 3 && and (zipWith (<) counts (drop 1 counts))) $ fail (show counts)
-    complete report `shouldBe` True
+    reportComplete report `shouldBe` True
 
   it "though the thread of the operator is masked" $
     uninterruptibleMask_ (decide firstEnd [hang, pure 'b']) `shouldReturn` 'b'
@@ -204,7 +204,7 @@ allEnds act = do
     run <- simulate' act
     modifyIORef' found (endOf (outcome run) :)
   ends <- nub . sort <$> readIORef found
-  pure (ends, schedules report)
+  pure (ends, reportSchedules report)
  where
   endOf = \case
     Sim.Returned a -> show a

@@ -20,7 +20,7 @@ import Behavior (Behavior, Seconds, both, sleep)
 import Behavior.Internal.Runtime (now)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (Options (..), Outcome (OutOfTime, Returned), Run (..), defaults, explain, simulateWith)
+import Behavior.Sim (SimOptions (..), Outcome (OutOfTime, Returned), Run (..), defaultSimOptions, explain, simulateWith)
 import qualified Behavior.Sim as Sim
 import Support
 import Watched
@@ -35,7 +35,7 @@ spec = guarded $ do
 -- | Runs it for at most a minute of simulated time, and returns how and when it ended.
 minute :: Behavior a -> IO (String, Seconds)
 minute act = do
-  run <- simulateWith defaults {endAt = 60} act
+  run <- simulateWith defaultSimOptions {endAt = 60} act
   pure (shown (outcome run), finished run)
  where
   shown = \case
@@ -131,7 +131,7 @@ unobservable = do
     let following n s = Signal.switch ((`div` n) . floor <$> s) $ \k ->
           now >>= \t -> note entries (n, k, t) >> hang
         body s = sleep 0.5 >> both (following 2 s) (following (3 :: Int) s) :: Behavior ()
-    _ <- simulateWith defaults {endAt = 8.5} (Signal.withShared time body)
+    _ <- simulateWith defaultSimOptions {endAt = 8.5} (Signal.withShared time body)
     -- Every second reading, or every third, is a change; the next reading decides.
     sort <$> notes entries
       `shouldReturn` [(2, 0, 1), (2, 1, 3), (2, 2, 5), (2, 3, 7), (3, 0, 1), (3, 1, 4), (3, 2, 7)]

@@ -249,7 +249,7 @@ mockDriver = do
       sleep 10
       modifyIORef' got (map (fmap (subtract zero)))
     readIORef got `shouldReturn` [('b', 2)]
-    map Mock.subject . Mock.entries <$> happened world `shouldReturn` ["orders: subscribed", "orders: 'b'", "orders: unsubscribed"]
+    map Mock.entrySubject . Mock.recordEntries <$> happened world `shouldReturn` ["orders: subscribed", "orders: 'b'", "orders: unsubscribed"]
 
   it "records each message" $ do
     (world, orders) <- world'

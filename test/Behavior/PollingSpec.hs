@@ -17,7 +17,7 @@ import Test.Hspec hiding (after, before)
 import Behavior (Behavior, Seconds, sleep, (|||))
 import Behavior.Internal.Runtime (Label (..), atomically, now)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (Options (scheduled, slip), Schedule (Seeded), defaults, simulate, simulateWith)
+import Behavior.Sim (SimOptions (scheduled, timerSlip), Schedule (Seeded), defaultSimOptions, simulate, simulateWith)
 import Support
 import Watched
 
@@ -66,7 +66,7 @@ slots = do
     for_ [1 .. 5] $ \seed -> do
       entries <- newLog
       let late = Signal.polling 0.01 (False <$ note entries ())
-      _ <- simulateWith defaults {slip = 0.004, scheduled = Seeded seed} (Signal.monitor late (pure ()) (sleep 5 ||| forever (sleep 0.0031)))
+      _ <- simulateWith defaultSimOptions {timerSlip = 0.004, scheduled = Seeded seed} (Signal.monitor late (pure ()) (sleep 5 ||| forever (sleep 0.0031)))
       notes entries >>= (`shouldSatisfy` (`elem` [500, 501])) . length
 
   it "after a slow reading the slots that it missed are skipped, and not made up for" $ do

@@ -11,7 +11,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck hiding (Failure)
 
 import Behavior
-import Behavior.Sim (Options (..), Outcome (..), Run (outcome), Schedule (Seeded), defaults, explain, simulateWith)
+import Behavior.Sim (SimOptions (..), Outcome (..), Run (outcome), Schedule (Seeded), defaultSimOptions, explain, simulateWith)
 import Behavior.Time
 import Support
 
@@ -70,7 +70,7 @@ periods = do
 
   it "does not drift, though timers are late" $ do
     let others = forever (sleep 0.07)
-    (_, starts) <- timedWith defaults {scheduled = Seeded 1, slip = 0.2} $ \started ->
+    (_, starts) <- timedWith defaultSimOptions {scheduled = Seeded 1, timerSlip = 0.2} $ \started ->
       timeout 99.5 (every 1 started ||| others)
     length starts `shouldBe` 100
     starts `shouldNotBe` [0 .. 99]
@@ -96,9 +96,9 @@ periods = do
 
 -- | Simulates a behaviour. It is given an action that records the time, and counts from zero.
 timed :: (Behavior Int -> Behavior ()) -> IO (Ending (), [Seconds])
-timed = timedWith defaults
+timed = timedWith defaultSimOptions
 
-timedWith :: Options -> (Behavior Int -> Behavior ()) -> IO (Ending (), [Seconds])
+timedWith :: SimOptions -> (Behavior Int -> Behavior ()) -> IO (Ending (), [Seconds])
 timedWith options act = do
   times <- newIORef []
   run <- simulateWith options . act $ do

@@ -62,7 +62,7 @@ missions = do
     (found, world) <- inspecting [Bed North 1, Bed North 2] calm {pictures = hanging}
     found `shouldBe` Map.fromList [(Bed North 1, NotSeen "timed out after 2.0 s"), seen (Bed North 2)]
     record <- happened world
-    [entryTime e | e <- entries record, subject e == "camera", argument e == "Bed North 1", entryKind e == Begins]
+    [entryTime e | e <- recordEntries record, entrySubject e == "camera", entryArgument e == "Bed North 1", entryKind e == Begins]
       `shouldBe` [2.25, 5.25, 8.25]
   it "opens the door only while no person is near" $ do
     (_, world) <- inspecting [Bed South 1] calm {someone = [(0, True), (5, False), (5.3, True), (7, False)]}
@@ -116,7 +116,7 @@ manySchedules = do
       { battery = [(0, 100), (moment, 15)]
       , orders = [(0, Auto), (moment, Manual), (moment + 1, Auto)]
       }
-  explored n setting property = explore (randomly n) {showException = asHspec} $ \simulated -> do
+  explored n setting property = explore (randomly n) {planShowException = asHspec} $ \simulated -> do
     (world, hardware) <- greenhouses setting
     _ <- condition world later [(t + 0.1, on) | (t, on) <- emergency setting]
     beds <- newBeds [Bed North 1, Bed South 1]

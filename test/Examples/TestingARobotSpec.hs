@@ -26,8 +26,8 @@ spec = guarded $ do
       wayHome goHomeAtFirst (exhaustively 1) `failsAs` 2
     it "fails again under the schedule that the page shows" $ do
       found <- try (wayHome goHomeAtFirst (exhaustively 1))
-      again <- try (wayHome goHomeAtFirst (replaying (either failing (const NonPreemptive) found)))
-      either (show . reason) show again `shouldBe` either (show . reason) show found
+      again <- try (wayHome goHomeAtFirst (replaying (either failingSchedule (const NonPreemptive) found)))
+      either (show . failingException) show again `shouldBe` either (show . failingException) show found
       either (length . failingSteps) (const 0) again `shouldBe` either (length . failingSteps) (const (-1)) found
   describe "A failed expectation of hspec" $ do
     it "is shown as by hspec, as the page says" $
@@ -64,11 +64,11 @@ rover = do
 
   it "stops its motor, whichever thread is quicker" $ do
     tried <- wholeMission goHome (randomly 1000)
-    tried `shouldSatisfy` complete
+    tried `shouldSatisfy` reportComplete
 
   it "stops its motor on the way home, under every schedule with two pre-emptions" $ do
     tried <- wayHome goHome (exhaustively 2)
-    tried `shouldSatisfy` complete
+    tried `shouldSatisfy` reportComplete
 
   it "stops its motor in reality" $
     trial (\it' -> untilButton it' (goHome it')) [(0, True)] id

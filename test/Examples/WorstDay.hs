@@ -37,7 +37,7 @@ failsWith why n day = do
     expectationFailure (unlines ("the wrong version is not rejected for this reason:" : show report : take 1 found))
 
 plan :: Int -> Plan
-plan n = (randomly n `endingAt` 1000) {showException = asHspec}
+plan n = (randomly n `endingAt` 1000) {planShowException = asHspec}
 
 -- | The day under the default schedule only.
 inOneRun :: Day -> Expectation

@@ -74,15 +74,15 @@ underAll from preemptions limit n language (Promise _ itsSalt gen keeping) =
 
 tried :: String -> Search -> (Stage -> IO ()) -> IO Tried
 tried program how keeping =
-  tryExplore (randomly 1) {search = how, runOptions = limits} (keeping . simulated) >>= \case
+  tryExplore (randomly 1) {planSearch = how, planOptions = limits} (keeping . simulated) >>= \case
     Left counterexample -> broken ("of this program:\n" ++ program ++ "\n" ++ show counterexample)
     Right report
-      | complete report -> pure (Tried 1 (schedules report) (pointsInAll report))
-      | otherwise -> broken ("there are more than " ++ show (schedules report) ++ " schedules of this program:\n" ++ program)
+      | reportComplete report -> pure (Tried 1 (reportSchedules report) (reportPoints report))
+      | otherwise -> broken ("there are more than " ++ show (reportSchedules report) ++ " schedules of this program:\n" ++ program)
 
 -- | Limits that no program comes near.
-limits :: Options
-limits = defaults {livelockLimit = 5000, endAt = 1000}
+limits :: SimOptions
+limits = defaultSimOptions {livelockLimit = 5000, endAt = 1000}
 
 -- | A simulated stage.
 simulated :: (Behavior () -> IO (Run ())) -> Stage
@@ -129,7 +129,7 @@ firstRejection limit seed language (Promise _ _ gen keeping) = go 1
     | otherwise = do
         let program = programFrom (gen Full) (seed * 1000003 + i)
         rejected <- newIORef False
-        _ <- tryExplore (randomly 1) {search = Random 1 (seed * 1000003 + i), runOptions = limits} $ \simulating ->
+        _ <- tryExplore (randomly 1) {planSearch = Random 1 (seed * 1000003 + i), planOptions = limits} $ \simulating ->
           keeping (simulated simulating) language program
             `catch` \(Broken _) -> writeIORef rejected True
         yes <- readIORef rejected

@@ -73,10 +73,10 @@ compareMany rule seed limit many runs found = go many (zip [seed ..] (programs s
 explored :: (IO String -> IO String) -> Int -> Program -> IO (Maybe (Int, Set String))
 explored rule limit p
   | size p > 14 = pure Nothing
-  | otherwise = outcomesBy (randomly 20) {runOptions = options} >>= maybe (pure Nothing) (const everything)
+  | otherwise = outcomesBy (randomly 20) {planOptions = options} >>= maybe (pure Nothing) (const everything)
  where
-  everything = outcomesBy (randomly 1) {search = Exhaustive maxBound limit, runOptions = options}
-  options = defaults {livelockLimit = 2000}
+  everything = outcomesBy (randomly 1) {planSearch = Exhaustive maxBound limit, planOptions = options}
+  options = defaultSimOptions {livelockLimit = 2000}
   outcomesBy plan = do
     seen <- newIORef (Just Set.empty)
     report <- explore plan $ \simulated' -> do
@@ -87,7 +87,7 @@ explored rule limit p
           Returned end -> Just (Set.insert end outcomes)
           _ -> Nothing
     outcomes <- readIORef seen
-    pure (if complete report then (,) (schedules report) <$> outcomes else Nothing)
+    pure (if reportComplete report then (,) (reportSchedules report) <$> outcomes else Nothing)
 
 -- | The outcomes of the given number of real runs, whose timing varies.
 inReality :: Int -> Int -> Program -> IO (Set String)

@@ -122,5 +122,5 @@ exploredBy plan program = do
       Returned a | null (leakedThreads run) -> a
       Returned a -> a ++ ", and threads are left: " ++ show (leakedThreads run)
       other -> explain other
-  unless (complete report) (fail ("not explored completely: " ++ show report))
+  unless (reportComplete report) (fail ("not explored completely: " ++ show report))
   readIORef seen

@@ -51,14 +51,14 @@ import qualified Behavior.Internal.Signal.Source as Library
 import Behavior.Sim
   ( StepKind (Note)
   , Label (..)
-  , Options (endAt, scheduled, slip, livelockLimit)
+  , SimOptions (endAt, scheduled, timerSlip, livelockLimit)
   , Plan (..)
-  , Report (complete)
+  , Report (reportComplete)
   , Run (finished, outcome)
   , Schedule
   , Search (Exhaustive)
-  , Step (at, did, label)
-  , defaults
+  , Step (stepTime, stepKind, stepLabel)
+  , defaultSimOptions
   , exhaustively
   , explore
   , simulateWith
@@ -130,14 +130,14 @@ operatorName = \case
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
-  report <- explore (exhaustively preemptions) {search = Exhaustive preemptions most, runOptions = limits world} $ \simulated ->
+  report <- explore (exhaustively preemptions) {planSearch = Exhaustive preemptions most, planOptions = limits world} $ \simulated ->
     observing plain simulated world >>= \(seen, _) -> modifyIORef' found (Set.insert seen)
   found' <- readIORef found
-  pure (found', complete report)
+  pure (found', reportComplete report)
 
 -- | A run without an end is cut short.
-limits :: World -> Options
-limits world = defaults {livelockLimit = 20000, endAt = 60, slip = fromIntegral (slippage world)}
+limits :: World -> SimOptions
+limits world = defaultSimOptions {livelockLimit = 20000, endAt = 60, timerSlip = fromIntegral (slippage world)}
 
 observing :: Instrument position -> (Behavior Value -> IO (Run Value)) -> World -> IO (Either String Seen, Run Value)
 observing instrument simulated world = do
@@ -165,10 +165,10 @@ observing instrument simulated world = do
   -- Evaluated, so that it does not keep the whole run in memory.
   evaluated whole = whole <$ evaluate (whole == whole)
   ticks = round
-  recorded (s : others) transitions = case (did s, transitions) of
-    (Note text, transition : later) | text == show transition -> (ticks (at s), transition) : recorded others later
+  recorded (s : others) transitions = case (stepKind s, transitions) of
+    (Note text, transition : later) | text == show transition -> (ticks (stepTime s), transition) : recorded others later
     -- The relation has the ends of branches only.
-    (Sim.Ends, _) | isBranch (label s) -> (ticks (at s), IsOver (show (label s))) : recorded others transitions
+    (Sim.Ends, _) | isBranch (stepLabel s) -> (ticks (stepTime s), IsOver (show (stepLabel s))) : recorded others transitions
     _ -> recorded others transitions
   recorded [] _ = []
   isBranch (Label _ name) = name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "throttle", "hysteresis"]

@@ -34,7 +34,7 @@ spec = guarded $ do
 
 -- | How the run ends under 1,000 schedules.
 everyEnd :: Show a => Behavior a -> IO [String]
-everyEnd act = nub . map (described . outcome) <$> mapM (\seed -> simulateWith defaults {scheduled = Seeded seed} act) [1 .. 1000]
+everyEnd act = nub . map (described . outcome) <$> mapM (\seed -> simulateWith defaultSimOptions {scheduled = Seeded seed} act) [1 .. 1000]
  where
   described end = case end of
     Returned a -> show a
@@ -111,7 +111,7 @@ asGHC = do
     ran <- newIORef False
     forM_ [1 .. 300] $ \seed -> do
       writeIORef ran False
-      run <- simulateWith defaults {scheduled = Seeded seed} $ do
+      run <- simulateWith defaultSimOptions {scheduled = Seeded seed} $ do
         thread <- mask_ (start (Label "target" "") (checkpoint >> writeIORef ran True >> atomically STM.retry))
         interrupt (threadId thread) (Cancel "a")
         atomically (threadEnd thread)
@@ -130,7 +130,7 @@ asGHC = do
             restore (pure ()) `catch` \(_ :: Cancel) -> annotate "handles"
         )
         (\target -> throwToIt target "a" >> sleep 1 >> atomically (writeTVar opened True))
-    [(at s, did s) | s <- steps run, label s == Label "target" "", did s `notElem` [Starts, Ends]]
+    [(stepTime s, stepKind s) | s <- steps run, stepLabel s == Label "target" "", stepKind s `notElem` [Starts, Ends]]
       `shouldBe` [(2, Note "unmasks"), (2, ReceivesException (show (Cancel "a"))), (2, Note "handles")]
 
 -- | Unmasks until nothing is raised any more.

@@ -40,10 +40,10 @@ motorOf mock = do
 records :: Spec
 records = do
   forM_
-    [ ("at endAt", \act -> simulateWith defaults {endAt = 10} (act (sleep 100)))
-    , ("at endAt, when all threads are blocked for ever", \act -> simulateWith defaults {endAt = 10} (act (atomically retry)))
+    [ ("at endAt", \act -> simulateWith defaultSimOptions {endAt = 10} (act (sleep 100)))
+    , ("at endAt, when all threads are blocked for ever", \act -> simulateWith defaultSimOptions {endAt = 10} (act (atomically retry)))
     , ("in a deadlock", \act -> simulate (act (atomically retry)))
-    , ("in a livelock", \act -> simulateWith defaults {livelockLimit = 1000} (act (forever checkpoint)))
+    , ("in a livelock", \act -> simulateWith defaultSimOptions {livelockLimit = 1000} (act (forever checkpoint)))
     , ("in a deadlock, in another thread", \act -> simulate (both (act (atomically retry)) (sleep 1)))
     , ("when it blocks outside of the simulation", \act -> simulate (act (newEmptyMVar >>= takeMVar)))
     ]
@@ -61,16 +61,16 @@ records = do
     mock <- newMock
     motor <- motorOf mock
     begun <- newEmptyMVar
-    let going = simulateWith defaults {livelockLimit = maxBound} (motor (checkpoint >> putMVar begun () >> forever checkpoint))
+    let going = simulateWith defaultSimOptions {livelockLimit = maxBound} (motor (checkpoint >> putMVar begun () >> forever checkpoint))
     withAsync (void going) $ \caller -> takeMVar begun >> cancel caller
     -- (The cancellation can arrive anywhere in the behaviour, except in its cleanup.)
-    count (becoming "motor runs" False) <$> happened mock `shouldReturn` 1
+    countOf (becoming "motor runs" False) <$> happened mock `shouldReturn` 1
   it "but contains all changes that were due by then" $ do
     mock <- newMock
     low <- condition mock "low" [(0, False), (50, True), (70, False)]
-    _ <- simulateWith defaults {endAt = 60} (begin mock >> Signal.waitUntil (Signal.watching retry))
+    _ <- simulateWith defaultSimOptions {endAt = 60} (begin mock >> Signal.waitUntil (Signal.watching retry))
     mock `shouldRecord` eventually (becoming "low" True)
-    count (becoming "low" False) <$> happened mock `shouldReturn` 1
+    countOf (becoming "low" False) <$> happened mock `shouldReturn` 1
     void (evaluate low)
   it "and contains everything that a returning run has done" $ do
     mock <- newMock
@@ -81,21 +81,21 @@ records = do
 ends :: Spec
 ends = do
   it "a run ends then, when all threads are blocked for ever" $ do
-    run <- simulateWith defaults {endAt = 60} (sleep 5 >> atomically retry :: Behavior ())
+    run <- simulateWith defaultSimOptions {endAt = 60} (sleep 5 >> atomically retry :: Behavior ())
     (explain (outcome run), finished run) `shouldBe` ("the virtual time has come to the end that was set", 60)
   it "a run without an end of its own ends then" $ do
-    run <- simulateWith defaults {endAt = 60} (forever (sleep 1) :: Behavior ())
+    run <- simulateWith defaultSimOptions {endAt = 60} (forever (sleep 1) :: Behavior ())
     (explain (outcome run), finished run) `shouldBe` ("the virtual time has come to the end that was set", 60)
   it "each run of an exploration has it, by endingAt" $ do
     report <- explore (randomly 20 `endingAt` 60) $ \run -> do
       made <- run (forever (sleep 1) :: Behavior ())
       when (finished made /= 60) (fail (show (finished made)))
-    schedules report `shouldBe` 20
+    reportSchedules report `shouldBe` 20
   it "no run reaches realTimeLimit; otherwise the report names endAt, realTimeLimit and the virtual time" $ do
     -- By default the run is over within 10 s.
-    realTimeLimit defaults `shouldBe` 9
+    realTimeLimit defaultSimOptions `shouldBe` 9
     begun <- getMonotonicTime
-    run <- simulateWith defaults {realTimeLimit = 0.2} (forever (sleep 1) :: Behavior ())
+    run <- simulateWith defaultSimOptions {realTimeLimit = 0.2} (forever (sleep 1) :: Behavior ())
     over <- getMonotonicTime
     case outcome run of
       TooSlow _ came -> do
@@ -126,7 +126,7 @@ faults' = do
     let lazy = unsafePerformIO (putMVar begun () >> takeMVar never') :: Int
     _ <- forkIO (void (evaluate lazy))
     takeMVar begun
-    run <- simulateWith defaults {realTimeLimit = 0.3} (void (evaluate lazy))
+    run <- simulateWith defaultSimOptions {realTimeLimit = 0.3} (void (evaluate lazy))
     putMVar never' 1
     case outcome run of
       BlockedOutside thread InThunk -> show thread `shouldBe` "main"
@@ -148,15 +148,15 @@ wide = do
   it "does so under a random schedule, too, when all threads sleep until the same time" $
     costs (Seeded 7) (const 1)
  where
-  costs schedule' moment = do
-    few <- allocated schedule' moment 1000
-    many <- allocated schedule' moment 10000
+  costs schedule moment = do
+    few <- allocated schedule moment 1000
+    many <- allocated schedule moment 10000
     (many `div` 1000, few `div` 1000) `shouldSatisfy` \(m, f) -> m <= 12 * f
   -- The allocation is a measure of the cost that does not depend on the machine's load.
-  allocated schedule' moment n = do
+  allocated schedule moment n = do
     performMajorGC
     before' <- allocated_bytes <$> getRTSStats
-    run <- simulateWith defaults {scheduled = schedule', realTimeLimit = 60} (allOf [sleep (moment i) | i <- [1 .. n :: Int]])
+    run <- simulateWith defaultSimOptions {scheduled = schedule, realTimeLimit = 60} (allOf [sleep (moment i) | i <- [1 .. n :: Int]])
     explain (outcome run) `shouldBe` "it returned"
     performMajorGC
     after' <- allocated_bytes <$> getRTSStats

@@ -25,12 +25,12 @@ spec = guarded . describe "In constant memory run" $ do
     late - early `shouldSatisfy` (< 50000)
 
   it "five thousand schedules of an exhaustive exploration" $ do
-    (early, late) <- liveAfter 500 5000 (exhaustively 4) {search = Exhaustive 4 5000} recharging
+    (early, late) <- liveAfter 500 5000 (exhaustively 4) {planSearch = Exhaustive 4 5000} recharging
     late - early `shouldSatisfy` (< 50000)
 
   it "many schedules of many threads, since the queue keeps only numbers" $ do
     -- The first measurement is before there is a queue, so it is the queue that is small.
-    (early, late) <- liveAfter 1 200 (exhaustively 2) {search = Exhaustive 2 200} $
+    (early, late) <- liveAfter 1 200 (exhaustively 2) {planSearch = Exhaustive 2 200} $
       void (allOf (replicate 60 (checkpoint >> sleep 1)))
     late - early `shouldSatisfy` (< 500000)
 

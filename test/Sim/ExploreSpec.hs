@@ -43,16 +43,16 @@ random = do
   it "runs the given number of schedules" $ do
     runs <- newIORef (0 :: Int)
     report <- explore (randomly 123) $ \run -> modifyIORef runs (+ 1) >> void (run (both (sleep 1) (sleep 1)))
-    (,) (schedules report) <$> readIORef runs `shouldReturn` (123, 123)
+    (,) (reportSchedules report) <$> readIORef runs `shouldReturn` (123, 123)
   it "finds a defect that needs one pre-emption" $ do
     found <- tryExplore (randomly 1000) (counting 2)
     either (const "found") show found `shouldBe` "found"
   it "is the same for the same seed, and different for a different seed" $ do
     let from seed = do
           seen <- newIORef []
-          _ <- explore (randomly 20) {search = Random 20 seed} $ \run -> do
+          _ <- explore (randomly 20) {planSearch = Random 20 seed} $ \run -> do
             made <- run (both (sleep 1) (both (sleep 1) (sleep 1)))
-            modifyIORef seen (show (schedule made) :)
+            modifyIORef seen (show (runSchedule made) :)
           readIORef seen
     one <- from 1
     from 1 `shouldReturn` one
@@ -68,35 +68,35 @@ exhaustive = do
       let write name = atomically (modifyTVar' order (name :))
       _ <- run (both (both (write 'a') (write 'b')) (write 'c'))
       readTVarIO order >>= \o -> modifyIORef orders (o :)
-    complete report `shouldBe` True
+    reportComplete report `shouldBe` True
     sort . nub <$> readIORef orders `shouldReturn` ["abc", "acb", "bac", "bca", "cab", "cba"]
   it "runs no schedule twice" $ do
     seen <- newIORef []
     _ <- explore (exhaustively 2) $ \run -> do
       made <- run (both (sleep 1 >> checkpoint) (sleep 1))
-      modifyIORef seen (show (schedule made) :)
+      modifyIORef seen (show (runSchedule made) :)
     all' <- readIORef seen
     length (nub all') `shouldBe` length all'
   it "tries the alternatives of the latest decision first, in the order of the thread numbers" $ do
     seen <- newIORef []
     _ <- explore (exhaustively 0) $ \run -> do
       made <- run (void (allOf [checkpoint, checkpoint, checkpoint]))
-      modifyIORef seen (schedule made :)
+      modifyIORef seen (runSchedule made :)
     take 6 . reverse <$> readIORef seen
       `shouldReturn` map Preempting [[], [(13, 3)], [(9, 3)], [(8, 2)], [(8, 2), (12, 3)], [(8, 3)]]
   it "finds no defect with fewer pre-emptions than that needs" $ do
-    let exploredWith k = either (const False) complete <$> tryExplore (exhaustively k) (counting 2)
+    let exploredWith k = either (const False) reportComplete <$> tryExplore (exhaustively k) (counting 2)
     (,) <$> exploredWith 0 <*> exploredWith 1 `shouldReturn` (True, False)
   it "reports that it is incomplete when there are more schedules than the limit" $ do
-    report <- explore (exhaustively 3) {search = Exhaustive 3 50} $ \run -> void (run (both (sleep 1) (sleep 1)))
-    (schedules report, complete report) `shouldBe` (50, False)
+    report <- explore (exhaustively 3) {planSearch = Exhaustive 3 50} $ \run -> void (run (both (sleep 1) (sleep 1)))
+    (reportSchedules report, reportComplete report) `shouldBe` (50, False)
 
 counterexample :: Spec
 counterexample = do
   it "is shrunk to the fewest pre-emptions that it needs" $ do
     found <- tryExplore (randomly 1000) (counting 3)
     case found of
-      Left c | Preempting s <- failing c -> length s `shouldBe` 1
+      Left c | Preempting s <- failingSchedule c -> length s `shouldBe` 1
       _ -> expectationFailure "it should have been found"
   it "fails again when it is replayed from its text" $ do
     found <- tryExplore (randomly 1000) (counting 3)
@@ -105,7 +105,7 @@ counterexample = do
         let text = drop (length "to see it again: explore (replaying (") (last (lines (show c)))
             printed = take (length text - 2) text
         again <- tryExplore (replaying (read printed)) (counting 3)
-        either (show . reason) (const "it held") again `shouldBe` show (reason c)
+        either (show . failingException) (const "it held") again `shouldBe` show (failingException c)
       Right _ -> expectationFailure "it should have been found"
   it "shows its steps, with times and threads" $ do
     found <- tryExplore (randomly 1000) (counting 2)
@@ -119,17 +119,17 @@ counterexample = do
                      ]
       Right _ -> expectationFailure "it should have been found"
   it "shows the property's exception with the plan's showException" $ do
-    found <- tryExplore (randomly 1000) {showException = const "not two"} (counting 2)
+    found <- tryExplore (randomly 1000) {planShowException = const "not two"} (counting 2)
     take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one pre-emption, this happens:"]
   it "shows an exception that did not occur again with the plan's showException" $ do
     runs <- newIORef (0 :: Int)
-    found <- tryExplore (randomly 1) {showException = maybe "another" (\(Fault text) -> "fault " ++ text) . fromException} $ \run -> do
+    found <- tryExplore (randomly 1) {planShowException = maybe "another" (\(Fault text) -> "fault " ++ text) . fromException} $ \run -> do
       n <- atomicModifyIORef' runs (\n -> (n + 1, n))
       _ <- run (pure ())
       when (n == 0) (throwIO (Fault "once"))
-    either (show . reason) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
+    either (show . failingException) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
   it "shows only the steps that the plan selects, and their number" $ do
-    found <- tryExplore (randomly 1000) {selectSteps = mentioning ["saw"]} (counting 2)
+    found <- tryExplore (randomly 1000) {planSelectSteps = mentioning ["saw"]} (counting 2)
     (drop 2 . lines <$> either (Just . show) (const Nothing) found)
       `shouldBe` Just
         [ "shrunk to one pre-emption, this happens (2 of 21 steps):"
@@ -139,12 +139,12 @@ counterexample = do
         ]
   it "can be narrowed to the steps of some threads" $ do
     run <- simulate (both (sleep 1) (both (sleep 1) (sleep 1)))
-    map number (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
+    map stepThread (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
   it "can be narrowed to the steps that mention a name, in the label or in the kind of step" $ do
     run <- simulate (both (annotate "a") (annotate "left"))
-    [(number s, did s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
+    [(stepThread s, stepKind s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
   it "distinguishes the branches of two operators" $ do
-    run <- simulateWith defaults {detailed = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
+    run <- simulateWith defaultSimOptions {detailedSteps = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
     lines (renderSteps (mentioning ["starts", "requests"] (steps run)))
       `shouldBe` [ "     0.000 s  1 both: left              starts"
                  , "     0.000 s  2 both: right             starts"
@@ -155,13 +155,13 @@ counterexample = do
                  , "     1.000 s  1 both: left              requests the stop of 4 parallel: right"
                  , "     3.000 s  2 both: right             requests the stop of 6 parallel: right"
                  ]
-    map parentNumber (take 2 (steps run)) `shouldBe` [-1, 0]
+    map stepParent (take 2 (steps run)) `shouldBe` [-1, 0]
   it "is found from a schedule that fails, by schedules with fewer pre-emptions" $ do
     let first = Seeded 18 -- the eighteenth of those that seed 0 tries
-    found <- tryExplore (replaying first) {search = Shrink first} (counting 2)
-    either failing (const first) found `shouldBe` Preempting [(5, 2)]
-    held <- tryExplore (replaying NonPreemptive) {search = Shrink NonPreemptive} (counting 2)
-    either show (show . schedules) held `shouldBe` "1"
+    found <- tryExplore (replaying first) {planSearch = Shrink first} (counting 2)
+    either failingSchedule (const first) found `shouldBe` Preempting [(5, 2)]
+    held <- tryExplore (replaying NonPreemptive) {planSearch = Shrink NonPreemptive} (counting 2)
+    either show (show . reportSchedules) held `shouldBe` "1"
   it "of a deadlock names the blocked threads" $ do
     found <- tryExplore (randomly 100) $ \run -> do
       made <- run (both (pure ()) (atomically retry :: Behavior ()))
@@ -183,19 +183,19 @@ counterexample = do
 
 properties :: Spec
 properties = do
-  it "need not simulate" $ schedules <$> explore (randomly 3) (const (pure ())) `shouldReturn` 3
+  it "need not simulate" $ reportSchedules <$> explore (randomly 3) (const (pure ())) `shouldReturn` 3
   it "simulates only once" $ do
     found <- tryExplore (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
-    either (show . reason) show found `shouldBe` "explore: a property simulates only once"
+    either (show . failingException) show found `shouldBe` "explore: a property simulates only once"
   it "fails when a run reaches the limit of real time" $ do
-    found <- tryExplore (randomly 1) {runOptions = defaults {realTimeLimit = 0.1}} $ \run ->
+    found <- tryExplore (randomly 1) {planOptions = defaultSimOptions {realTimeLimit = 0.1}} $ \run ->
       void (run (mapM_ (evaluate . length . show) [0 :: Int ..]))
-    either (show . reason) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
+    either (show . failingException) show found `shouldSatisfy` ("limit of real time" `isInfixOf`)
   it "that throws a cancellation ends the exploration" $ do
-    end <- ending (schedules <$> explore (randomly 3) (\_ -> throwIO (Cancel "user")))
+    end <- ending (reportSchedules <$> explore (randomly 3) (\_ -> throwIO (Cancel "user")))
     end `shouldBe` CancelledBy (show (Cancel "user"))
   it "fails with the reason when the schedule does not fit" $ do
     found <- tryExplore (replaying (Preempting [(2, 9)])) $ \run -> do
       made <- run (both (sleep 1) (sleep 1))
-      when (points made < 0) (fail "unreachable")
-    either (show . reason) show found `shouldSatisfy` ("the schedule does not fit" `isInfixOf`)
+      when (runPoints made < 0) (fail "unreachable")
+    either (show . failingException) show found `shouldSatisfy` ("the schedule does not fit" `isInfixOf`)

@@ -13,7 +13,7 @@ import Behavior
 import Behavior.Internal.Runtime (Label (..), threadId, throwToAll, start, threadEnd)
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (Options (..), Outcome (..), Run (..), Schedule (..), defaults, simulate, simulateWith)
+import Behavior.Sim (SimOptions (..), Outcome (..), Run (..), Schedule (..), defaultSimOptions, simulate, simulateWith)
 import qualified Behavior.Sim as Sim
 import Behavior.Sim.Mock
 import Behavior.Time (atomically, now, timeout)
@@ -60,16 +60,16 @@ calls = do
     look <- action mock "look" [returning 'a', fails "dark", faults "bug", returning 'b']
     ends <- replicateM 5 (ending look)
     ends `shouldBe` [Gave 'a', FailedWith "FailedBecause \"dark\"", FaultedWith "bug", Gave 'b', Gave 'b']
-    map entryKind . entries <$> happened mock
+    map entryKind . recordEntries <$> happened mock
       `shouldReturn` concatMap (\end -> [Begins, end]) [Succeeds, Fails "dark", Faults "bug", Succeeds, Succeeds]
-    map call . entries <$> happened mock `shouldReturn` [1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    map entryCall . recordEntries <$> happened mock `shouldReturn` [1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
 
   it "uses each script exactly once, also with concurrent callers" $ do
     mock <- newMock
     ticket <- action mock "ticket" (map returning [1 :: Int ..])
     tickets <- mapConcurrently (const (replicateM 50 ticket)) "12345678"
     sort (concat tickets) `shouldBe` [1 .. 400]
-    sort . map call . filter ((== Succeeds) . entryKind) . entries <$> happened mock `shouldReturn` [1 .. 400]
+    sort . map entryCall . filter ((== Succeeds) . entryKind) . recordEntries <$> happened mock `shouldReturn` [1 .. 400]
     count' <- sensor mock "count" (map returning [1 :: Int ..])
     counts <- mapConcurrently (const (replicateM 50 count')) "12345678"
     sort (concat counts) `shouldBe` [1 .. 400]
@@ -86,7 +86,7 @@ calls = do
     open <- actionOn mock "open" $ \door -> if door == "front" then [fails "locked"] else [fails "stuck", returning door]
     ending (fallbackOver ["front", "back"] open) `shouldReturn` FailedWith "FailedBecause \"stuck\""
     fallbackOver ["front", "back"] open `shouldReturn` "back"
-    map show . entries <$> happened mock
+    map show . recordEntries <$> happened mock
       `shouldReturn` [ "open \"front\": begins"
                      , "open \"front\": fails, locked"
                      , "open \"back\": begins"
@@ -133,7 +133,7 @@ stopped = do
         mock <- newMock
         act <- action mock "act" [script]
         end <- runSimulated (timeout 1 act)
-        (,) end . map (\e -> (entryTime e, entryKind e)) . entries <$> happened mock
+        (,) end . map (\e -> (entryTime e, entryKind e)) . recordEntries <$> happened mock
 
   it "stops at once" $
     stopping (succeeds `taking` 9)
@@ -163,7 +163,7 @@ stopped = do
         thread <- mask_ (start (Label "test" "act") act)
         replicateM_ 3 $ sleep 1 >> throwToAll (const (Cancel "again")) [threadId thread]
         atomically (threadEnd thread)
-      map (\e -> (entryTime e, entryKind e)) . entries <$> happened mock
+      map (\e -> (entryTime e, entryKind e)) . recordEntries <$> happened mock
         `shouldReturn` [(0, Begins), (1, StopRequested), (t, end)]
 
   it "does not begin when the request comes first" $ do
@@ -187,7 +187,7 @@ records = do
       returned <- newIORef (0 :: Int)
       -- Masked, so that no exception arrives between the return and the counting.
       let counting = replicateM_ 3 . mask_ $ (act >> readIORef returned >>= writeIORef returned . (+ 1))
-      _ <- simulateWith defaults {scheduled = Seeded seed} (timeout 1 counting ? sleep 1)
+      _ <- simulateWith defaultSimOptions {scheduled = Seeded seed} (timeout 1 counting ? sleep 1)
       n <- readIORef returned
       mock `shouldRecord` exactly n (successOf "act")
 
@@ -195,9 +195,9 @@ records = do
     for_ [1 .. 100] $ \seed -> do
       mock <- newMock
       act <- action mock "act" [succeeds, succeeds `taking` 1 `slowToStop` 1, fails "x"]
-      _ <- simulateWith defaults {scheduled = Seeded seed} (firstOf [act, act ? act, sleep 1])
+      _ <- simulateWith defaultSimOptions {scheduled = Seeded seed} (firstOf [act, act ? act, sleep 1])
       mock `shouldRecord` whenever (startOf "act") (eventually (endOf "act"))
-      began <- count (startOf "act") <$> happened mock
+      began <- countOf (startOf "act") <$> happened mock
       mock `shouldRecord` exactly began (endOf "act")
 
   it "is in the steps of a simulated run as well" $ do
@@ -205,7 +205,7 @@ records = do
     act <- action mock "act" [fails "x" `taking` 2]
     low <- condition mock "low" [(0, False), (1, True)]
     ran <- simulate (act ? Signal.waitUntil (signal low))
-    [(Sim.at step, text) | step <- Sim.steps ran, Sim.Note text <- [Sim.did step]]
+    [(Sim.stepTime step, text) | step <- Sim.steps ran, Sim.Note text <- [Sim.stepKind step]]
       `shouldBe` [(0, "act: begins"), (2, "act: fails, x"), (2, "low: becomes True")]
     timelineOf mock `shouldReturn` ["0.0 s  low: is False", "0.0 s  act: begins", "1.0 s  low: becomes True", "2.0 s  act: fails, x"]
 
@@ -262,7 +262,7 @@ polled = do
     mock <- newMock
     tick <- condition mock "tick" (zip (iterate (+ 1) 0) (cycle "ab"))
     runSimulated (begin mock >> sleep 1001 >> reading tick) `shouldReturn` ("returned 'b'", 1001)
-    count (becoming "tick" 'a') <$> happened mock `shouldReturn` 501
+    countOf (becoming "tick" 'a') <$> happened mock `shouldReturn` 501
  where
   none = "failed FailedBecause \"level has no value\""
 
@@ -293,7 +293,7 @@ watched = do
       low <- condition mock "low" [(0, True), (1, False), (3, True)]
       recharge <- action mock "recharge" [succeeds `taking` 2]
       tidy <- action mock "tidy" [succeeds `taking` 0.5]
-      r <- simulateWith defaults {scheduled = Seeded seed} (Signal.monitor (signal low) recharge tidy)
+      r <- simulateWith defaultSimOptions {scheduled = Seeded seed} (Signal.monitor (signal low) recharge tidy)
       finished r `shouldBe` 2.5
       mock `shouldRecord` exactly 1 (startOf "recharge")
 
@@ -308,10 +308,10 @@ watched = do
     leavingNothing (Signal.rSelect (signal low) (pure 'l') (pure 'r')) `shouldReturn` 'r'
     wet <- condition mock "wet" [(0, True)]
     ran <- simulate (Signal.waitUntil (signal wet))
-    [Sim.label step | step <- Sim.steps ran, Sim.did step == Sim.Starts] `shouldNotContain` [Label "waitUntil" "clock"]
+    [Sim.stepLabel step | step <- Sim.steps ran, Sim.stepKind step == Sim.Starts] `shouldNotContain` [Label "waitUntil" "clock"]
     cold <- condition mock "cold" [(0, False), (1, True)]
     other <- simulate (Signal.waitUntil (signal cold))
-    [Sim.label step | step <- Sim.steps other, Sim.did step == Sim.Starts] `shouldContain` [Label "waitUntil" "clock"]
+    [Sim.stepLabel step | step <- Sim.steps other, Sim.stepKind step == Sim.Starts] `shouldContain` [Label "waitUntil" "clock"]
 
   it "works when the clock of the world was started late, with any rounding" $
     for_ [0.1, 0.7, 1 / 3, 1e6 + 0.1] $ \t -> do
@@ -345,13 +345,13 @@ worlds = do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate (sleep 5 >> act >> sleep 1 >> note mock "over")
-    map entryTime . entries <$> happened mock `shouldReturn` [0, 0, 1]
+    map entryTime . recordEntries <$> happened mock `shouldReturn` [0, 0, 1]
 
   it "has a clock that can be started before that" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate (begin mock >> sleep 5 >> begin mock >> act)
-    map entryTime . entries <$> happened mock `shouldReturn` [5, 5]
+    map entryTime . recordEntries <$> happened mock `shouldReturn` [5, 5]
 
   it "works on real threads" $ do
     mock <- newMock
@@ -362,7 +362,7 @@ worlds = do
     over <- now
     over - begun `shouldSatisfy` (>= 0.002)
     mock `shouldRecord` becoming "low" True `comesBefore` successOf "act"
-    map entryTime . filter ((== "low") . subject) . entries <$> happened mock `shouldReturn` [0, 0.001]
+    map entryTime . filter ((== "low") . entrySubject) . recordEntries <$> happened mock `shouldReturn` [0, 0.001]
 
   it "reports why a claim does not hold" $ do
     mock <- newMock

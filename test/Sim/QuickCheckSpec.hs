@@ -11,7 +11,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck
 
 import Behavior
-import Behavior.Sim hiding (label)
+import Behavior.Sim
 import Behavior.Sim.QuickCheck
 import Behavior.Time (atomically)
 import Support

@@ -104,7 +104,7 @@ number =
   it "holds for the exact number of entries" $ do
     hold [exactly 2 (startOf "drive"), exactly 0 (startOf "sing"), exactly 1 (successOf "charge")]
     doNotHold [exactly 1 (startOf "drive"), exactly 3 (startOf "drive")]
-    count (endOf "drive") day `shouldBe` 2
+    countOf (endOf "drive") day `shouldBe` 2
 
 universality :: Spec
 universality = do
@@ -199,22 +199,22 @@ moments :: Spec
 moments = do
   it "are those of one argument, or of any argument" $ do
     let doors = Record ["open"] [RecordEntry 0 "open" "\"front\"" 1 Begins, RecordEntry 1 "open" "\"front\"" 1 (Fails "locked"), RecordEntry 1 "open" "\"back\"" 1 Begins]
-    count (startOf "open") doors `shouldBe` 2
-    count (startOf "open \"front\"") doors `shouldBe` 1
+    countOf (startOf "open") doors `shouldBe` 2
+    countOf (startOf "open \"front\"") doors `shouldBe` 1
     doors `shouldSatisfy` holds (never (startOf "open \"cellar\""))
 
   it "are not those of another subject with the same prefix" $
-    count (startOf "open") (Record ["open", "open door"] [line 0 "open door" Begins]) `shouldBe` 0
+    countOf (startOf "open") (Record ["open", "open door"] [line 0 "open door" Begins]) `shouldBe` 0
 
   it "of anyOf are those of each alternative, counted once" $
-    count (anyOf [startOf "drive", startOf "charge", startOf "drive"]) day `shouldBe` 3
+    countOf (anyOf [startOf "drive", startOf "charge", startOf "drive"]) day `shouldBe` 3
 
   it "can be restricted to an interval, or to the time outside of it" $ do
-    count (startOf "drive" `outside` being "low" True) day `shouldBe` 2
-    count (startOf "charge" `during` being "low" True) day `shouldBe` 1
-    count (startOf "charge" `during` running "drive") day `shouldBe` 0
-    count (endOf "drive" `during` running "drive") day `shouldBe` 0
-    count (becoming "low" True `during` running "drive") day `shouldBe` 1
+    countOf (startOf "drive" `outside` being "low" True) day `shouldBe` 2
+    countOf (startOf "charge" `during` being "low" True) day `shouldBe` 1
+    countOf (startOf "charge" `during` running "drive") day `shouldBe` 0
+    countOf (endOf "drive" `during` running "drive") day `shouldBe` 0
+    countOf (becoming "low" True `during` running "drive") day `shouldBe` 1
 
 whiles :: Spec
 whiles = do
@@ -223,16 +223,16 @@ whiles = do
         nested = [line 0 "b" Begins, line 1 "a" Begins, line 2 "a" Succeeds, line 3 "b" Succeeds]
         apart = [line 0 "a" Begins, line 1 "a" Succeeds, line 1 "b" Begins, line 3 "b" Succeeds]
         open = [line 0 "a" Begins, line 5 "b" Begins]
-        overlaps rows = count (running "a" `overlapping` running "b") (Record ["a", "b"] rows)
+        overlaps rows = countOf (running "a" `overlapping` running "b") (Record ["a", "b"] rows)
     map overlaps [one, nested, apart, open] `shouldBe` [1, 1, 0, 1]
 
   it "overlap with themselves when two calls run at once" $ do
     let rows = [RecordEntry 0 "a" "" 1 Begins, RecordEntry 1 "a" "" 2 Begins, RecordEntry 2 "a" "" 1 Succeeds, RecordEntry 3 "a" "" 3 Begins, RecordEntry 4 "a" "" 2 Stops]
-    count (running "a" `overlapping` running "a") (Record ["a"] rows) `shouldBe` 2
+    countOf (running "a" `overlapping` running "a") (Record ["a"] rows) `shouldBe` 2
 
   it "include the cleanup" $
-    count (interruptionOf "drive" `during` running "drive") day `shouldBe` 1
+    countOf (interruptionOf "drive" `during` running "drive") day `shouldBe` 1
 
   it "end when the condition loses its value" $ do
     let rows = [line 0 "x" (Becomes "1"), line 1 "x" LosesValue, line 2 "a" Begins]
-    count (startOf "a" `during` being "x" (1 :: Int)) (Record ["x", "a"] rows) `shouldBe` 0
+    countOf (startOf "a" `during` being "x" (1 :: Int)) (Record ["x", "a"] rows) `shouldBe` 0

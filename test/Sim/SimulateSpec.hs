@@ -71,12 +71,12 @@ times = do
     forM_ [1 .. 40] $ \seed -> do
       order <- newTVarIO []
       let arm name = sleep 1 >> atomically (modifyTVar' order (name :))
-      _ <- simulateWith defaults {scheduled = Seeded seed} (both (arm 'l') (arm 'r'))
+      _ <- simulateWith defaultSimOptions {scheduled = Seeded seed} (both (arm 'l') (arm 'r'))
       readTVarIO order >>= \o -> modifyIORef logged (o :)
     orders <- readIORef logged
     nub orders `shouldMatchList` ["lr", "rl"]
   it "up to endAt" $ do
-    run <- simulateWith defaults {endAt = 10} (forever (sleep 3) :: Behavior ())
+    run <- simulateWith defaultSimOptions {endAt = 10} (forever (sleep 3) :: Behavior ())
     explain (outcome run) `shouldContain` "the end that was set"
     finished run `shouldBe` 10
 
@@ -95,18 +95,18 @@ deterministic :: Spec
 deterministic = do
   it "in each step" $
     forM_ [1 .. 50] $ \seed -> do
-      let options = defaults {scheduled = Seeded seed, detailed = True}
+      let options = defaultSimOptions {scheduled = Seeded seed, detailedSteps = True}
       one <- simulateWith options mission
       other <- simulateWith options mission
-      (ended one, steps one, schedule one) `shouldBe` (ended other, steps other, schedule other)
+      (ended one, steps one, runSchedule one) `shouldBe` (ended other, steps other, runSchedule other)
   it "and the schedule of a run replays it" $
     forM_ [1 .. 50] $ \seed -> do
-      one <- simulateWith defaults {scheduled = Seeded seed, detailed = True} mission
-      other <- simulateWith defaults {scheduled = schedule one, detailed = True} mission
-      (ended one, steps one, schedule one) `shouldBe` (ended other, steps other, schedule other)
+      one <- simulateWith defaultSimOptions {scheduled = Seeded seed, detailedSteps = True} mission
+      other <- simulateWith defaultSimOptions {scheduled = runSchedule one, detailedSteps = True} mission
+      (ended one, steps one, runSchedule one) `shouldBe` (ended other, steps other, runSchedule other)
   it "and different for different schedules" $ do
-    runs <- mapM (\seed -> simulateWith defaults {scheduled = Seeded seed} mission) [1 .. 50]
-    length (nub (map (show . schedule) runs)) `shouldSatisfy` (> 25)
+    runs <- mapM (\seed -> simulateWith defaultSimOptions {scheduled = Seeded seed} mission) [1 .. 50]
+    length (nub (map (show . runSchedule) runs)) `shouldSatisfy` (> 25)
   it "also during garbage collections" $ do
     -- The runtime system must not detect a deadlock for a thread that waits for its turn.
     run <- simulate (both (forM_ [1 .. 5 :: Int] (\_ -> performMajorGC >> sleep 1)) (sleep 3 >> sleep 4))
@@ -129,7 +129,7 @@ delivery = do
   it "to a thread that has not begun: before its first step" $ do
     logged <- newIORef []
     -- The second branch runs after the first has failed.
-    void . simulateWith defaults {scheduled = Preempting [(4, 1), (5, 1), (6, 0)]} $
+    void . simulateWith defaultSimOptions {scheduled = Preempting [(4, 1), (5, 1), (6, 0)]} $
       parallel (failed :: Behavior ()) (modifyIORef logged ("began" :))
     began <- readIORef logged
     began `shouldSatisfy` (`elem` [[], ["began"]])
@@ -156,11 +156,11 @@ mistakes = do
                  , "  both: right waits for the end of its sleep"
                  ]
   it "a livelock" $ do
-    run <- simulateWith defaults {livelockLimit = 3000} (parallel (forever checkpoint) (forever checkpoint))
+    run <- simulateWith defaultSimOptions {livelockLimit = 3000} (parallel (forever checkpoint) (forever checkpoint))
     explain (outcome run)
       `shouldBe` "livelock: the virtual time does not advance while these threads run: parallel: left, parallel: right"
   it "a livelock of one thread" $ do
-    run <- simulateWith defaults {livelockLimit = 3000} (forever checkpoint :: Behavior ())
+    run <- simulateWith defaultSimOptions {livelockLimit = 3000} (forever checkpoint :: Behavior ())
     explain (outcome run) `shouldContain` "livelock"
   describe "a thread that blocks outside of the library," $ do
     outside "takeMVar" (newEmptyMVar >>= takeMVar) "use atomically and a TMVar"
@@ -185,10 +185,10 @@ mistakes = do
     run <- simulate (atomically comesTrue)
     explain (outcome run) `shouldContain` "something outside of the simulation changed what these waited for"
   it "a computation without end" $ do
-    run <- simulateWith defaults {realTimeLimit = 0.1} (mapM_ (evaluate . length . show) [0 :: Int ..])
+    run <- simulateWith defaultSimOptions {realTimeLimit = 0.1} (mapM_ (evaluate . length . show) [0 :: Int ..])
     explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
   it "a loop that never allocates, if it is compiled with -fno-omit-yields" $ do
-    run <- simulateWith defaults {realTimeLimit = 0.1} (busy 0)
+    run <- simulateWith defaultSimOptions {realTimeLimit = 0.1} (busy 0)
     explain (outcome run) `shouldContain` "main ran when the limit of real time was reached"
   it "a simulation inside of a simulation" $ do
     run <- simulate (finished <$> simulate (pure ()))
@@ -196,7 +196,7 @@ mistakes = do
   describe "a schedule that does not fit" $ do
     let small = both (sleep 1) (sleep 2)
         mismatch preemptions text = do
-          run <- simulateWith defaults {scheduled = Preempting preemptions} small
+          run <- simulateWith defaultSimOptions {scheduled = Preempting preemptions} small
           explain (outcome run) `shouldContain` ("the schedule does not fit this behaviour: " ++ text)
     it "because the thread cannot run there" $ mismatch [(3, 7)] "at point 3 thread 7 cannot run; those that can: [1,2]"
     it "because the run is shorter" $ mismatch [(300, 1)] "the run ended before point 300"
@@ -247,13 +247,13 @@ unwinding = do
     readIORef count `shouldReturn` counted
   it "at endAt, every cleanup has run" $ do
     logged <- newIORef []
-    _ <- simulateWith defaults {endAt = 1} (parallel (sleep 5 `finally` modifyIORef logged ("left" :)) (sleep 9 `finally` modifyIORef logged ("right" :)))
+    _ <- simulateWith defaultSimOptions {endAt = 1} (parallel (sleep 5 `finally` modifyIORef logged ("left" :)) (sleep 9 `finally` modifyIORef logged ("right" :)))
     reverse <$> readIORef logged `shouldReturn` ["right", "left"]
   it "by a cancellation of the simulation's caller, every cleanup has run" $ do
     logged <- newIORef []
     begun <- newEmptyMVar
     let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef logged ("cleaned up" :)
-    withAsync (simulateWith defaults {livelockLimit = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
+    withAsync (simulateWith defaultSimOptions {livelockLimit = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
       takeMVar begun
       cancel caller
     readIORef logged `shouldReturn` ["cleaned up"]
@@ -264,11 +264,11 @@ unwinding = do
 beside :: Spec
 beside = do
   it "two simulations at once are independent" $ do
-    alone <- simulateWith defaults {scheduled = Seeded 7, detailed = True} mission
+    alone <- simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission
     (one, other) <-
       concurrently
-        (mapM (\_ -> simulateWith defaults {scheduled = Seeded 7, detailed = True} mission) [1 .. 20 :: Int])
-        (mapM (\_ -> simulateWith defaults {scheduled = Seeded 7, detailed = True} mission) [1 .. 20 :: Int])
+        (mapM (\_ -> simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission) [1 .. 20 :: Int])
+        (mapM (\_ -> simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission) [1 .. 20 :: Int])
     forM_ (one ++ other) $ \run -> steps run `shouldBe` steps alone
   it "a real behaviour runs in real time" $ do
     begun <- newEmptyMVar
@@ -288,4 +288,4 @@ beside = do
   it "a note of another run is not in the steps" $ do
     annotate "outside"
     run <- simulate (annotate "inside")
-    [text | Note text <- map did (steps run)] `shouldBe` ["inside"]
+    [text | Note text <- map stepKind (steps run)] `shouldBe` ["inside"]

@@ -19,9 +19,9 @@ spec :: Spec
 spec = guarded . describe "Slip" $ do
   it "of 0 gives the same schedules, and every sleeper wakes on time" $
     forM_ [1 .. 200] $ \seed -> do
-      exact <- simulateWith defaults {scheduled = Seeded seed, detailed = True} sleepers
-      again <- simulateWith defaults {scheduled = Seeded seed, detailed = True, slip = 0} sleepers
-      (steps again, schedule again) `shouldBe` (steps exact, schedule exact)
+      exact <- simulateWith defaultSimOptions {scheduled = Seeded seed, detailedSteps = True} sleepers
+      again <- simulateWith defaultSimOptions {scheduled = Seeded seed, detailedSteps = True, timerSlip = 0} sleepers
+      (steps again, runSchedule again) `shouldBe` (steps exact, runSchedule exact)
       late again `shouldBe` Just [0, 0, 0, 0]
   it "lets a sleeper wake before another that is due less than the slip earlier" $ do
     orders <- ordersWith 0.5 [1, 1.3]
@@ -30,29 +30,29 @@ spec = guarded . describe "Slip" $ do
     ordersWith 0.5 [1, 1.5] `shouldReturn` [[1, 1.5]]
     ordersWith 0 [1, 1.3] `shouldReturn` [[1, 1.3]]
   it "makes some sleepers late, each by less than the slip" $ do
-    lates <- mapM (\seed -> late <$> simulateWith defaults {scheduled = Seeded seed, slip = 0.5} sleepers) [1 .. 300]
+    lates <- mapM (\seed -> late <$> simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 0.5} sleepers) [1 .. 300]
     forM_ lates $ \l -> l `shouldSatisfy` maybe False (all (\s -> 0 <= s && s < 0.5))
     lates `shouldSatisfy` any (maybe False (any (> 0)))
   it "is part of the schedule of a run" $
     forM_ [1 .. 100] $ \seed -> do
-      one <- simulateWith defaults {scheduled = Seeded seed, slip = 0.5, detailed = True} sleepers
-      other <- simulateWith defaults {scheduled = schedule one, slip = 0.5, detailed = True} sleepers
-      (steps one, schedule one, finished one) `shouldBe` (steps other, schedule other, finished other)
+      one <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 0.5, detailedSteps = True} sleepers
+      other <- simulateWith defaultSimOptions {scheduled = runSchedule one, timerSlip = 0.5, detailedSteps = True} sleepers
+      (steps one, runSchedule one, finished one) `shouldBe` (steps other, runSchedule other, finished other)
   it "is explored exhaustively, and does not count as a pre-emption" $ do
     orders <- newIORef []
-    report <- explore ((exhaustively 0) {runOptions = defaults {slip = 0.5}}) $ \simulated -> do
+    report <- explore ((exhaustively 0) {planOptions = defaultSimOptions {timerSlip = 0.5}}) $ \simulated -> do
       order <- newTVarIO []
       _ <- simulated (ordered order [1, 1.3, 1.4])
       readTVarIO order >>= \o -> modifyIORef orders (reverse o :)
-    complete report `shouldBe` True
+    reportComplete report `shouldBe` True
     nub . sort <$> readIORef orders
       `shouldReturn` sort [[1, 1.3, 1.4], [1, 1.4, 1.3], [1.3, 1, 1.4], [1.3, 1.4, 1], [1.4, 1, 1.3], [1.4, 1.3, 1]]
   it "does not move the time beyond endAt" $
     forM_ [1 .. 50] $ \seed -> do
-      run <- simulateWith defaults {scheduled = Seeded seed, slip = 5, endAt = 2} (both (sleep 1) (sleep 4))
+      run <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 5, endAt = 2} (both (sleep 1) (sleep 4))
       finished run `shouldBe` 2
   it "finds a defect that depends on exact timers" $ do
-    found <- tryExplore ((randomly 1000) {runOptions = defaults {slip = 0.1}}) $ \simulated -> do
+    found <- tryExplore ((randomly 1000) {planOptions = defaultSimOptions {timerSlip = 0.1}}) $ \simulated -> do
       run <- simulated $ do
         parked <- newTVarIO False
         both
@@ -83,5 +83,5 @@ ordersWith slip' moments = nub <$> mapM one [1 .. 200]
  where
   one seed = do
     order <- newTVarIO []
-    _ <- simulateWith defaults {scheduled = Seeded seed, slip = slip'} (ordered order moments)
+    _ <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = slip'} (ordered order moments)
     reverse <$> readTVarIO order

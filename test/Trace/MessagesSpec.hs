@@ -27,7 +27,7 @@ spec = around_ leavingNothing $ prop "of messages and their handlers are right" 
 messagesTraced :: Property
 messagesTraced =
   forAll ((,,) <$> (choose (0, 5) >>= \n -> vectorOf n (choose (0, 3))) <*> choose (0, 2) <*> arbitrary) $ \(pauses, takes, seed) -> ioProperty $ do
-    run <- Sim.simulateWith Sim.defaults {Sim.scheduled = Seeded seed} (mission pauses (fromIntegral (takes :: Int)))
+    run <- Sim.simulateWith Sim.defaultSimOptions {Sim.scheduled = Seeded seed} (mission pauses (fromIntegral (takes :: Int)))
     let spans = [s | Began s <- Sim.events run]
         ended = [(s, how) | Ended s _ how <- Sim.events run]
         reactions = [r | Reacted r <- Sim.events run]

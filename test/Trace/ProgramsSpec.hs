@@ -119,8 +119,8 @@ sinksChangeNothing =
         equal name a b =
           conjoin
             [ same (name ++ ", steps") (show (Sim.steps a), show (Sim.steps b))
-            , same (name ++ ", points") (Sim.points a, Sim.points b)
-            , same (name ++ ", schedule") (Sim.schedule a, Sim.schedule b)
+            , same (name ++ ", points") (Sim.runPoints a, Sim.runPoints b)
+            , same (name ++ ", schedule") (Sim.runSchedule a, Sim.runSchedule b)
             , same (name ++ ", time") (Sim.finished a, Sim.finished b)
             , same (name ++ ", end") (Sim.explain (Sim.outcome a), Sim.explain (Sim.outcome b))
             , same (name ++ ", events") (Sim.events a, Sim.events b)

@@ -12,7 +12,7 @@ import Test.Hspec
 
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
-import Behavior.Sim (Run (..), defaults, explain, outcome, simulateWith)
+import Behavior.Sim (Run (..), defaultSimOptions, explain, outcome, simulateWith)
 import qualified Behavior.Sim as Sim
 import Behavior.Trace
 import Support hiding (End, Ending (..), Failure, ThreadEvent (..))
@@ -104,7 +104,7 @@ simulated :: Spec
 simulated = do
   it "receives events with virtual times" $ do
     seen <- newIORef []
-    _ <- simulateWith defaults (withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] (named "sleep" (sleep 3600)))
+    _ <- simulateWith defaultSimOptions (withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] (named "sleep" (sleep 3600)))
     times <- readIORef seen
     [(spanBegan s, t) | Ended s t _ <- times] `shouldBe` [(0, 3600)]
 
@@ -113,8 +113,8 @@ simulated = do
       for_ [1 .. 100] $ \seed -> do
         never <- newEmptyMVar
         let mission traced = traced (named "a" (both (named "b" (sleep 1 >> sleep 1)) (named "c" (sleep 1.5))) >> (named "d" failed ? sleep 1))
-            run traced = simulateWith defaults {Sim.scheduled = Sim.Seeded seed} (mission traced)
-            summary r = (explain (outcome r), finished r, points r, schedule r)
+            run traced = simulateWith defaultSimOptions {Sim.scheduled = Sim.Seeded seed} (mission traced)
+            summary r = (explain (outcome r), finished r, runPoints r, runSchedule r)
             sinks = [EachEvent (\_ -> throwIO (Fault "sink")), EachEvent (\_ -> pure ())] ++ [EachEvent (\_ -> takeMVar never) | seed == 7]
         plain <- run id
         traced <- run (withTraceOptions defaultTraceOptions {waitAtEnd = 0.1} sinks)

@@ -21,7 +21,7 @@ import Behavior.Internal.Trace.Place (Place (trace), Receiver (..), inPlace, myP
 import Behavior.Internal.Trace.Span (abandonableIn)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (Options (scheduled), Run (events), Schedule (..), defaults, simulateWith)
+import Behavior.Sim (SimOptions (scheduled), Run (events), Schedule (..), defaultSimOptions, simulateWith)
 import Behavior.Time (abandoning, atomically, cleanupWithin, timeout)
 import Behavior.Trace
 import Memory (inConstantMemory)
@@ -235,7 +235,7 @@ reactions = do
 
   it "has the values of the transaction that decided, whatever changes them afterwards" $
     for_ [1 .. 200] $ \seed -> do
-      run <- simulateWith defaults {scheduled = Seeded seed} $ do
+      run <- simulateWith defaultSimOptions {scheduled = Seeded seed} $ do
         level <- newTVarIO (0 :: Int)
         let high = (> 0) <$> Signal.named "level" (Signal.watching (readTVar level))
             set = atomically . writeTVar level
@@ -269,7 +269,7 @@ reactions = do
       around' `shouldBe` inside
 
   it "names of ordered rules those whose conditions have changed, and decide" $ do
-    run <- simulateWith defaults $ do
+    run <- simulateWith defaultSimOptions $ do
       danger <- newTVarIO (0 :: Int)
       order <- newTVarIO 0
       rain <- newTVarIO 0

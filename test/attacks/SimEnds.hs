@@ -30,16 +30,16 @@ attack = do
   putStrLn ("the same seed, the same run; memory " ++ show (before, after))
   forM_ [1 .. 1500 :: Int] $ \k -> do
     _ <- inThread 10000 "an interrupted simulation" $
-      timeout (k `mod` 400) (void (simulateWith defaults {scheduled = Seeded k} (void program >> void program)))
+      timeout (k `mod` 400) (void (simulateWith defaultSimOptions {scheduled = Seeded k} (void program >> void program)))
     left <- liveThreadCount
     promise (show left ++ " threads were left") (left == 0)
  where
   same seed = do
-    a <- simulateWith defaults {scheduled = Seeded seed, detailed = True} program
-    b <- simulateWith defaults {scheduled = Seeded seed, detailed = True} program
+    a <- simulateWith defaultSimOptions {scheduled = Seeded seed, detailedSteps = True} program
+    b <- simulateWith defaultSimOptions {scheduled = Seeded seed, detailedSteps = True} program
     promise ("seed " ++ show seed ++ " gives two runs") (steps a == steps b && explain (outcome a) == explain (outcome b) && finished a == finished b)
     when (seed `mod` 10 == 0) $ do
-      c <- simulateWith defaults {scheduled = schedule a, detailed = True} program
+      c <- simulateWith defaultSimOptions {scheduled = runSchedule a, detailedSteps = True} program
       promise ("seed " ++ show seed ++ ": its schedule does not replay it") (steps a == steps c && explain (outcome a) == explain (outcome c))
   resident False = pure 0
   resident True = performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats

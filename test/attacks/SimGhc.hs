@@ -18,7 +18,7 @@ import Behavior.Time (atomically, timeout)
 
 attack :: IO ()
 attack = forM_ programs $ \(name, fixed, program) -> do
-  simulated <- sort . nub <$> forM [1 .. 2000] (\seed -> simulateWith defaults {scheduled = Seeded seed} program >>= run . explained)
+  simulated <- sort . nub <$> forM [1 .. 2000] (\seed -> simulateWith defaultSimOptions {scheduled = Seeded seed} program >>= run . explained)
   real <- sort . nub <$> forM [1 .. 300 :: Int] (\_ -> inThread 5000 name program >>= run)
   putStrLn (name ++ ": " ++ show simulated ++ " and really " ++ show real)
   promise (name ++ ": really " ++ show real ++ ", and simulated " ++ show simulated) (all (`elem` simulated) real)

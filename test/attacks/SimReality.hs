@@ -18,7 +18,7 @@ import Behavior.STM
 attack :: IO ()
 attack = forM_ programs $ \(name, program) -> do
   simulated <- fmap (sort . nub) . forM [1 .. 40000] $ \seed ->
-    simulateWith defaults {scheduled = Seeded seed} program >>= run . explained
+    simulateWith defaultSimOptions {scheduled = Seeded seed} program >>= run . explained
   real <- sort . nub <$> forM [1 .. 500 :: Int] (\_ -> inThread 5000 name program >>= run)
   promise (name ++ ": really " ++ show real ++ ", and simulated " ++ show simulated) (all (`elem` simulated) real)
  where

@@ -91,7 +91,7 @@ module Behavior.Sim.Mock
   , during
   , outside
   , overlapping
-  , count
+  , countOf
 
     -- ** Intervals
   , Interval

@@ -217,12 +217,12 @@ holds claim = either (const False) (const True) . verdict claim
 verdict :: Claim -> Record -> Either String ()
 verdict claim record = case (unknown, violation claim (numbered record) (Origin (-1) 0)) of
   (name : _, _) ->
-    refuted (claimWords claim) ("Nothing in this world is called " ++ show name ++ ", only " ++ commas (map show (subjects record)) ++ ".") []
+    refuted (claimWords claim) ("Nothing in this world is called " ++ show name ++ ", only " ++ commas (map show (recordSubjects record)) ++ ".") []
   ([], Just v) ->
-    refuted (broken v) (capital (reason v) ++ if null (entries record) then "." else ":") (excerpt (map fst (shown v)) (entries record))
+    refuted (broken v) (capital (reason v) ++ if null (recordEntries record) then "." else ":") (excerpt (map fst (shown v)) (recordEntries record))
   ([], Nothing) -> Right ()
  where
-  unknown = [name | name <- claimNames claim, not (any (`names` name) (subjects record))]
+  unknown = [name | name <- claimNames claim, not (any (`names` name) (recordSubjects record))]
   names known name = known == name || (known ++ " ") `isPrefixOf` name
   commas = intercalate ", "
   refuted which why rows = Left (unlines (("This does not hold: " ++ which ++ ".") : why : rows))

@@ -22,7 +22,7 @@ module Behavior.Internal.Mock.Moment
   , during
   , outside
   , overlapping
-  , count
+  , countOf
 
     -- * Intervals
   , Interval (..)
@@ -123,7 +123,7 @@ momentOf verb isIt name =
     }
 
 isAbout :: RecordEntry -> String -> Bool
-isAbout entry name = name `elem` [subject entry, fullName entry]
+isAbout entry name = name `elem` [entrySubject entry, fullName entry]
 
 isEnd :: EntryKind -> Bool
 isEnd kind = case kind of
@@ -135,7 +135,7 @@ isEnd kind = case kind of
 
 -- | Any of these.
 --
--- >>> count (anyOf [startOf "drive", startOf "charge"]) record
+-- >>> countOf (anyOf [startOf "drive", startOf "charge"]) record
 -- 2
 --
 -- @since 0.1.0.0
@@ -210,16 +210,16 @@ infixl 8 `during`, `outside`, `overlapping`
 
 -- | How often it happened.
 --
--- >>> count (startOf "drive") record
+-- >>> countOf (startOf "drive") record
 -- 1
 --
 -- @since 0.1.0.0
-count :: Moment -> Record -> Int
-count m = length . occurrences m . numbered
+countOf :: Moment -> Record -> Int
+countOf m = length . occurrences m . numbered
 
 -- | The lines of a record.
 numbered :: Record -> Lines
-numbered = zip [0 ..] . entries
+numbered = zip [0 ..] . recordEntries
 
 -- | Something that has a start and an end: an action that runs, or a condition that has
 -- a certain value.
@@ -240,7 +240,7 @@ running :: String -> Interval
 running name =
   Interval (show name ++ " is running") [name] $
     rangesFrom (\e -> e `isAbout` name && entryKind e == Begins) $ \begun e ->
-      fullName e == fullName begun && call e == call begun && isEnd (entryKind e)
+      fullName e == fullName begun && entryCall e == entryCall begun && isEnd (entryKind e)
 
 -- | The condition, or the value that the sensor reads, is this.
 --

@@ -23,14 +23,14 @@ import Behavior.Internal.Runtime (Seconds)
 --
 -- @since 0.1.0.0
 data Record = Record
-  { subjects :: [String]
+  { recordSubjects :: [String]
   -- ^ The names of everything in the world, including those without an entry.
-  , entries :: [RecordEntry]
+  , recordEntries :: [RecordEntry]
   }
   deriving (Eq)
 
 instance Show Record where
-  show = unlines . timeline . entries
+  show = unlines . timeline . recordEntries
 
 -- | One entry of a record.
 --
@@ -38,11 +38,11 @@ instance Show Record where
 data RecordEntry = RecordEntry
   { entryTime :: Seconds
   -- ^ In seconds since the clock of the world was started.
-  , subject :: String
+  , entrySubject :: String
   -- ^ The name of the action, condition or sensor; or the text of the note.
-  , argument :: String
+  , entryArgument :: String
   -- ^ The argument, shown, of an action that has one; otherwise empty.
-  , call :: Int
+  , entryCall :: Int
   -- ^ The number of the call of the action (with this argument), from 1.
   , entryKind :: EntryKind
   }
@@ -64,7 +64,7 @@ instance Show RecordEntry where
       LosesValue -> ": has no value any more"
       Noted -> ""
     again
-      | call entry > 1 = " (call " ++ show (call entry) ++ ")"
+      | entryCall entry > 1 = " (call " ++ show (entryCall entry) ++ ")"
       | otherwise = ""
 
 -- | What a record entry says.
@@ -103,8 +103,8 @@ recorded names = Record names . sortOn entryTime . reverse
 -- | The subject of an entry, with the argument if there is one.
 fullName :: RecordEntry -> String
 fullName entry
-  | null (argument entry) = subject entry
-  | otherwise = subject entry ++ " " ++ argument entry
+  | null (entryArgument entry) = entrySubject entry
+  | otherwise = entrySubject entry ++ " " ++ entryArgument entry
 
 -- | The lines of a timeline.
 timeline :: [RecordEntry] -> [String]

@@ -132,7 +132,7 @@ checkTimes mayFollow rule times = for_ (zip (Nothing : map Just times) (take 100
 --
 -- >>> wave <- action mock "wave" [succeeds]
 -- >>> wave
--- >>> map entryKind . entries <$> happened mock
+-- >>> map entryKind . recordEntries <$> happened mock
 -- [Begins,Succeeds]
 --
 -- @since 0.1.0.0

@@ -69,7 +69,7 @@ data Trial = Trial
 --   if finished run == 1 then pure () else fail "the first to finish does not end it"
 -- :}
 --
--- >>> complete report
+-- >>> reportComplete report
 -- True
 --
 -- @since 0.1.0.0
@@ -82,20 +82,20 @@ explore plan property =
 -- | 'explore' that returns the counterexample.
 --
 -- >>> found <- tryExplore (exhaustively 1) (\simulate -> simulate (sleep 1) >>= \run -> if finished run > 0 then fail "late" else pure ())
--- >>> either failing (error . show) found
+-- >>> either failingSchedule (error . show) found
 -- Preempting []
 --
 -- @since 0.1.0.0
 tryExplore
   :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
-tryExplore plan property = case search plan of
+tryExplore plan property = case planSearch plan of
   Random n seed -> randomSearch n seed
   Exhaustive k limit -> fullSearch k limit
   Replay s -> only s $ \e t ->
-    pure Counterexample {failing = s, reason = e, failingSteps = happened t, failingEvents = traceOfRun t, schedulesTried = 1, foundBy = plan}
+    pure Counterexample {failingSchedule = s, failingException = e, failingSteps = happened t, failingEvents = traceOfRun t, schedulesTried = 1, foundBy = plan}
   Shrink s -> only s (reduced 1)
  where
-  o = runOptions plan
+  o = planOptions plan
   try' chooser' = tryRun o chooser' property
 
   only s onFailure = do
@@ -138,9 +138,9 @@ tryExplore plan property = case search plan of
   reduced i e t = do
     (fewer, e') <- shrunk (deviations t) e
     (fewest, e'') <- simplest fewer e'
-    again <- tryRun o {detailed = True} (preempting True fewest) property
-    let why = fromMaybe (toException (Unrepeatable (showException plan e''))) (thrown again)
-    pure Counterexample {failing = Preempting fewest, reason = why, failingSteps = happened again, failingEvents = traceOfRun again, schedulesTried = i, foundBy = plan}
+    again <- tryRun o {detailedSteps = True} (preempting True fewest) property
+    let why = fromMaybe (toException (Unrepeatable (planShowException plan e''))) (thrown again)
+    pure Counterexample {failingSchedule = Preempting fewest, failingException = why, failingSteps = happened again, failingEvents = traceOfRun again, schedulesTried = i, foundBy = plan}
 
   -- Leaving out one pre-emption changes the numbers of the later points, so the remaining
   -- pre-emptions may no longer fit. So this searches from the beginning, the schedules with the
@@ -181,7 +181,7 @@ tryExplore plan property = case search plan of
   without n these = [take i these ++ drop (i + n) these | i <- [0, n .. length these - 1]]
 
 -- | Runs the property once.
-tryRun :: Options -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
+tryRun :: SimOptions -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
 tryRun o choosing property = do
   made <- newIORef Nothing
   let simulating act = do
@@ -191,10 +191,10 @@ tryRun o choosing property = do
           Nothing -> do
             chooser' <- choosing
             run <- simulateBy o chooser' act
-            let deviating = case schedule run of
+            let deviating = case runSchedule run of
                   Preempting s -> s
                   _ -> []
-            writeIORef made (Just (\thrown' -> Trial thrown' deviating (steps run) (events run) (points run)))
+            writeIORef made (Just (\thrown' -> Trial thrown' deviating (steps run) (events run) (runPoints run)))
             case outcome run of
               BlockedOutside _ _ -> improper run
               ExternalWakeup _ -> improper run

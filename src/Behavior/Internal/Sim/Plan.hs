@@ -31,23 +31,23 @@ import Behavior.Internal.Trace.Event (Event)
 -- | Which schedules to run, and how. Begin with one of 'randomly', 'exhaustively' and
 -- 'replaying', and change some of its fields:
 --
--- >>> let plan = (randomly 1000) {search = Random 1000 7, runOptions = defaults {endAt = 60}}
+-- >>> let plan = (randomly 1000) {planSearch = Random 1000 7, planOptions = defaultSimOptions {endAt = 60}}
 --
 -- @since 0.1.0.0
 data Plan = Plan
-  { search :: Search
-  , runOptions :: Options
+  { planSearch :: Search
+  , planOptions :: SimOptions
   -- ^ The field 'scheduled' is ignored.
-  , showException :: SomeException -> String
+  , planShowException :: SomeException -> String
   -- ^ How the text of a 'Counterexample' shows the property's exception; by default with
   -- 'Control.Exception.displayException'.
-  , selectSteps :: [Step] -> [Step]
+  , planSelectSteps :: [Step] -> [Step]
   -- ^ The steps that this text shows; by default all. (See 'ofThreads', 'mentioning'.)
   }
 
 -- | A plan with the default text.
-plan :: Search -> Options -> Plan
-plan s o = Plan {search = s, runOptions = o, showException = text, selectSteps = id}
+plan :: Search -> SimOptions -> Plan
+plan s o = Plan {planSearch = s, planOptions = o, planShowException = text, planSelectSteps = id}
 
 -- | Which schedules to run.
 --
@@ -69,12 +69,12 @@ data Search
 --
 -- The seed is 0. Another seed tries other schedules.
 --
--- >>> search (randomly 1000)
+-- >>> planSearch (randomly 1000)
 -- Random 1000 0
 --
 -- @since 0.1.0.0
 randomly :: Int -> Plan
-randomly n = plan (Random n 0) defaults
+randomly n = plan (Random n 0) defaultSimOptions
 
 -- | All schedules with up to the given number of pre-emptions, but at most a million schedules:
 -- for small behaviours. (Where the running thread has to wait, the choice of the next thread is
@@ -82,43 +82,43 @@ randomly n = plan (Random n 0) defaults
 --
 -- @since 0.1.0.0
 exhaustively :: Int -> Plan
-exhaustively k = plan (Exhaustive k 1000000) defaults
+exhaustively k = plan (Exhaustive k 1000000) defaultSimOptions
 
 -- | Only this schedule, with detailed steps: to replay a 'Counterexample'.
 --
 -- @since 0.1.0.0
 replaying :: Schedule -> Plan
-replaying s = plan (Replay s) defaults {detailed = True}
+replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 
 -- | The same plan with an end: every run is ended with 'OutOfTime' when the virtual time
 -- reaches this ('endAt'). For missions that do not end by themselves.
 --
 -- >>> import Control.Monad (forever)
 -- >>> report <- explore (randomly 100 `endingAt` 60) (\simulate -> () <$ simulate (forever (sleep 1)))
--- >>> schedules report
+-- >>> reportSchedules report
 -- 100
 --
 -- @since 0.1.0.0
 endingAt :: Plan -> Seconds -> Plan
-endingAt whole end = whole {runOptions = (runOptions whole) {endAt = end}}
+endingAt whole end = whole {planOptions = (planOptions whole) {endAt = end}}
 
 -- | How many schedules were explored.
 --
 -- @since 0.1.0.0
 data Report = Report
-  { schedules :: !Int
+  { reportSchedules :: !Int
   -- ^ How many schedules were run.
-  , complete :: !Bool
+  , reportComplete :: !Bool
   -- ^ Whether those were all schedules of the plan.
-  , pointsInAll :: !Int
+  , reportPoints :: !Int
   -- ^ How many scheduling points they had, in all.
   }
   deriving (Eq)
 
 instance Show Report where
   show r =
-    show (schedules r) ++ " schedules of " ++ show (pointsInAll r) ++ " points in all"
-      ++ (if complete r then "" else ", and there are more")
+    show (reportSchedules r) ++ " schedules of " ++ show (reportPoints r) ++ " points in all"
+      ++ (if reportComplete r then "" else ", and there are more")
 
 -- | A schedule under which the property does not hold.
 --
@@ -126,8 +126,8 @@ instance Show Report where
 --
 -- @since 0.1.0.0
 data Counterexample = Counterexample
-  { failing :: Schedule
-  , reason :: SomeException
+  { failingSchedule :: Schedule
+  , failingException :: SomeException
   -- ^ The exception that the property threw.
   , failingSteps :: [Step]
   -- ^ The detailed steps.
@@ -144,7 +144,7 @@ instance Show Counterexample where
     intercalate
       "\n"
       [ "schedule " ++ show (schedulesTried c) ++ " fails:"
-      , indented (showException (foundBy c) (reason c))
+      , indented (planShowException (foundBy c) (failingException c))
       , renderSchedule c
       ]
    where
@@ -166,16 +166,16 @@ renderSchedule :: Counterexample -> String
 renderSchedule c =
   intercalate
     "\n"
-    [ schedule' ++ ", this happens" ++ omission ++ ":"
+    [ preempted ++ ", this happens" ++ omission ++ ":"
     , dropWhileEnd (== '\n') (renderSteps selected)
-    , "to see it again: explore (replaying (" ++ show (failing c) ++ "))"
+    , "to see it again: explore (replaying (" ++ show (failingSchedule c) ++ "))"
     ]
  where
-  selected = selectSteps (foundBy c) (failingSteps c)
+  selected = planSelectSteps (foundBy c) (failingSteps c)
   omission
     | length selected == length (failingSteps c) = ""
     | otherwise = " (" ++ show (length selected) ++ " of " ++ show (length (failingSteps c)) ++ " steps)"
-  schedule' = case failing c of
+  preempted = case failingSchedule c of
     Preempting [] -> "shrunk to the non-preemptive schedule"
     Preempting [_] -> "shrunk to one pre-emption"
     Preempting several -> "shrunk to " ++ show (length several) ++ " pre-emptions"

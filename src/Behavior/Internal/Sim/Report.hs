@@ -46,19 +46,19 @@ explain = \case
   Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
   Livelock labels -> "livelock: the virtual time does not advance while these threads run: " ++ commas labels
   OutOfTime -> "the virtual time has come to the end that was set"
-  BlockedOutside label' blocked -> show label' ++ " waited outside of the simulation, " ++ waitAndAdvice blocked
+  BlockedOutside name blocked -> show name ++ " waited outside of the simulation, " ++ waitAndAdvice blocked
   ExternalWakeup waiting ->
     listed
       "something outside of the simulation changed what these waited for (a thread of forkIO or async? \
       \start it by parallel, both or fork)"
       waiting
-  TooSlow label' (Seconds t) ->
-    show label' ++ " ran when the limit of real time was reached, at " ++ showFFloat (Just 3) t " s of virtual time: \
+  TooSlow name (Seconds t) ->
+    show name ++ " ran when the limit of real time was reached, at " ++ showFFloat (Just 3) t " s of virtual time: \
       \it computes for very long, or for ever (see realTimeLimit), or the behaviour has no end (see endAt)"
   ScheduleMismatch why -> "the schedule does not fit this behaviour: " ++ why
 
 listed :: String -> [Waiting] -> String
-listed title = intercalate "\n  " . (title :) . map (\(Waiting who' what') -> show who' ++ " waits for " ++ what')
+listed title = intercalate "\n  " . (title :) . map (\(Waiting who what) -> show who ++ " waits for " ++ what)
 
 waitAndAdvice :: Blocked -> String
 waitAndAdvice = \case
@@ -108,9 +108,9 @@ waitAndAdvice = \case
 renderSteps :: [Step] -> String
 renderSteps made = unlines (concatMap (map line . take 1) (groupBy repeated made))
  where
-  repeated s t = (at s, number s, did s) == (at t, number t, did t)
+  repeated s t = (stepTime s, stepThread s, stepKind s) == (stepTime t, stepThread t, stepKind t)
   line s =
-    padLeft 10 (seconds (at s)) ++ " s  " ++ padRight width (thread s) ++ "  " ++ aside (did s)
+    padLeft 10 (seconds (stepTime s)) ++ " s  " ++ padRight width (thread s) ++ "  " ++ aside (stepKind s)
   width = maximum (0 : map (length . thread) made)
   seconds (Seconds t) = showFFloat (Just 3) t ""
   padLeft n t = replicate (n - length t) ' ' ++ t
@@ -118,7 +118,7 @@ renderSteps made = unlines (concatMap (map line . take 1) (groupBy repeated made
 
 -- | The thread's number, its label, and the number of the branch that it is inside.
 thread :: Step -> String
-thread s = show (number s) ++ " " ++ show (label s) ++ (if parentNumber s > 0 then " (of " ++ show (parentNumber s) ++ ")" else "")
+thread s = show (stepThread s) ++ " " ++ show (stepLabel s) ++ (if stepParent s > 0 then " (of " ++ show (stepParent s) ++ ")" else "")
 
 -- | Only the steps of the threads with the given numbers.
 --
@@ -129,7 +129,7 @@ thread s = show (number s) ++ " " ++ show (label s) ++ (if parentNumber s > 0 th
 --
 -- @since 0.1.0.0
 ofThreads :: [Int] -> [Step] -> [Step]
-ofThreads numbers = filter ((`elem` numbers) . number)
+ofThreads numbers = filter ((`elem` numbers) . stepThread)
 
 -- | Only the steps whose line contains one of the given texts: for example a part of a thread's
 -- label, or the name of an action or a condition.
@@ -142,14 +142,14 @@ ofThreads numbers = filter ((`elem` numbers) . number)
 --
 -- @since 0.1.0.0
 mentioning :: [String] -> [Step] -> [Step]
-mentioning texts = filter (\s -> any (`isInfixOf` (thread s ++ "  " ++ aside (did s))) texts)
+mentioning texts = filter (\s -> any (`isInfixOf` (thread s ++ "  " ++ aside (stepKind s))) texts)
 
 -- | The text of what a thread did.
 aside :: StepKind -> String
 aside = \case
   Starts -> "starts"
   Ends -> "ends"
-  Note what' -> what'
+  Note what -> what
   ReceivesException e -> "is interrupted: " ++ e
   Throws n target -> "requests the stop of " ++ show n ++ " " ++ show target
   Transacts -> "transaction"

@@ -44,10 +44,10 @@ simulation :: Sim -> Simulator
 simulation sim =
   Simulator
     { isRunning = \self -> (== Just self) . taskThread <$> readIORef (current sim)
-    , spawn = \label' body publish -> do
+    , spawn = \name body publish -> do
         operation sim AlwaysEnabled
         me <- readIORef (current sim)
-        snd <$> launch sim (taskNumber me) label' body publish
+        snd <$> launch sim (taskNumber me) name body publish
     , deliver = \target e -> withTarget target $ \me there ->
         if taskNumber there == taskNumber me
           then throwTo target e
@@ -79,22 +79,22 @@ simulation sim =
 
 -- | Starts a task and its real thread, which waits for its first turn.
 launch :: Sim -> Int -> Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO (Task, Async ())
-launch sim starter label' body publish = do
+launch sim starter name body publish = do
   entrance <- newEmptyMVar
   thread <- mask_ $ asyncOnWithUnmask (capability sim) $ \unmask -> do
     uninterruptibleMask_ (takeMVar entrance)
     self <- readIORef (current sim)
     a <- body (arrive sim self) unmask
     uninterruptibleMask_ (leave sim self (publish a))
-  task <- enlist sim starter label' (Just (asyncThreadId thread, entrance)) Unstarted
+  task <- enlist sim starter name (Just (asyncThreadId thread, entrance)) Unstarted
   pure (task, thread)
 
 enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> Position -> IO Task
-enlist sim starter label' thread here = do
+enlist sim starter name thread here = do
   entrance <- maybe newEmptyMVar (pure . snd) thread
   n <- readIORef (nextNumber sim)
   writeIORef (nextNumber sim) (n + 1)
-  task <- Task n label' (fst <$> thread) entrance <$> newIORef here <*> newIORef Nothing <*> newIORef [] <*> pure starter
+  task <- Task n name (fst <$> thread) entrance <$> newIORef here <*> newIORef Nothing <*> newIORef [] <*> pure starter
   modifyIORef' (tasks sim) (IntMap.insert n task)
   for_ (taskThread task) $ \there -> modifyIORef' (threads sim) (Map.insert there task)
   task <$ file sim task

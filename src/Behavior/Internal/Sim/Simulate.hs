@@ -41,7 +41,7 @@ import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, t
 
 -- | Runs a behaviour in a simulation, under the non-preemptive schedule.
 --
--- > simulate  =  simulateWith defaults
+-- > simulate  =  simulateWith defaultSimOptions
 --
 -- [Result] How the run ended ('Outcome'): also if the behaviour failed or faulted, and also for a
 --   deadlock, a livelock, and the mistakes that a simulation finds.
@@ -61,30 +61,30 @@ import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, t
 --
 -- @since 0.1.0.0
 simulate :: Behavior a -> IO (Run a)
-simulate = simulateWith defaults
+simulate = simulateWith defaultSimOptions
 
 -- | 'simulate' with the given options.
 --
--- >>> run <- simulateWith defaults {scheduled = Seeded 7} (both (sleep 1) (sleep 2))
+-- >>> run <- simulateWith defaultSimOptions {scheduled = Seeded 7} (both (sleep 1) (sleep 2))
 -- >>> finished run
 -- 2.0
 --
 -- A behaviour that does not end needs an end time:
 --
--- >>> run <- simulateWith defaults {endAt = 10} (forever (sleep 3))
+-- >>> run <- simulateWith defaultSimOptions {endAt = 10} (forever (sleep 3))
 -- >>> explain (outcome run)
 -- "the virtual time has come to the end that was set"
 -- >>> finished run
 -- 10.0
 --
 -- @since 0.1.0.0
-simulateWith :: Options -> Behavior a -> IO (Run a)
+simulateWith :: SimOptions -> Behavior a -> IO (Run a)
 simulateWith o act = do
   chooser' <- policy (scheduled o)
   simulateBy o chooser' act
 
 -- | 'simulateWith' under the given policy.
-simulateBy :: Options -> Policy -> Behavior a -> IO (Run a)
+simulateBy :: SimOptions -> Policy -> Behavior a -> IO (Run a)
 simulateBy o chooser' act = do
   nested <- simulator
   when (isJust nested) . throwIO . ErrorCall $
@@ -117,8 +117,8 @@ simulateBy o chooser' act = do
             , finished = time'
             , steps = made
             , events = happened
-            , schedule = Preempting deviating
-            , points = count
+            , runSchedule = Preempting deviating
+            , runPoints = count
             , leakedThreads = left
             }
 

@@ -50,7 +50,7 @@ import Behavior.Internal.Trace.Event (Event)
 
 -- | A simulation.
 data Sim = Sim
-  { options :: !Options
+  { options :: !SimOptions
   , policyOf :: !Policy
   , capability :: !Int
   -- ^ All tasks are on one capability, so that passing the turn costs little.
@@ -155,7 +155,7 @@ instance Exception Unwind where
   fromException = asyncExceptionFromException
 
 -- | A simulation without tasks, on the caller's capability.
-newSim :: Options -> Policy -> IO Sim
+newSim :: SimOptions -> Policy -> IO Sim
 newSim o p = do
   (here, _) <- threadCapability =<< myThreadId
   firstDecision <- askAt p
@@ -214,13 +214,13 @@ committed sim = do
 
 -- | Records a step of the task that has the turn.
 recordStep :: Sim -> StepKind -> IO ()
-recordStep sim what' = do
+recordStep sim kind = do
   me <- readIORef (current sim)
   t <- readIORef (time sim)
   n <- readIORef (counter sim)
-  modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) (parent me) what' :)
+  modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) (parent me) kind :)
 
 -- | The same, only in a detailed run.
 recordDetail :: Sim -> StepKind -> IO ()
-recordDetail sim what' = when (detailed (options sim)) (recordStep sim what')
+recordDetail sim kind = when (detailedSteps (options sim)) (recordStep sim kind)
 {-# INLINE recordDetail #-}

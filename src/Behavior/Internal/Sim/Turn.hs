@@ -127,7 +127,7 @@ advanceTime sim = do
     if Map.null enabledTasks then osSleep 1000 >> wokenFromOutside (n - 1) else pure True
 
   -- The new time: the next moment at which a sleeper is due, or a later such moment that is
-  -- less than 'slip' after it.
+  -- less than 'timerSlip' after it.
   later asleep next = case (Map.toAscList within, Map.lookupMin within) of
     (_ : _ : _, Just (usualChoice, _)) -> do
       n <- readIORef (counter sim)
@@ -140,8 +140,8 @@ advanceTime sim = do
     within = Map.fromList [(k, (t, task)) | (t, (k, task)) <- Map.toList firsts]
     firsts = Map.fromListWith (\_ old -> old) [(t, (k, task)) | ((t, k), task) <- inReach]
     inReach
-      | slip (options sim) > 0 =
-          Map.toAscList (Map.takeWhileAntitone (\(t, _) -> t < next + slip (options sim) && t <= end) asleep)
+      | timerSlip (options sim) > 0 =
+          Map.toAscList (Map.takeWhileAntitone (\(t, _) -> t < next + timerSlip (options sim) && t <= end) asleep)
       | otherwise = []
 
 -- | What each of these tasks waits for.
@@ -153,8 +153,8 @@ waitingTasks sim these = do
  where
   waitingTask alive task = do
     here <- maybe (pure Nothing) placeOf (taskThread task)
-    what' <- reason alive task <$> readIORef (blockedAt task)
-    pure (Waiting (taskLabel task) (what' ++ inPath here))
+    what <- reason alive task <$> readIORef (blockedAt task)
+    pure (Waiting (taskLabel task) (what ++ inPath here))
   sent target = do
     all' <- readIORef (pending target)
     pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- all', isNothing (sender p)]

@@ -7,8 +7,8 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Types
   ( -- * Options
-    Options (..)
-  , defaults
+    SimOptions (..)
+  , defaultSimOptions
   , Schedule (..)
 
     -- * Results
@@ -29,7 +29,7 @@ import Behavior.Internal.Trace.Event (Event)
 -- | How to simulate.
 --
 -- @since 0.1.0.0
-data Options = Options
+data SimOptions = SimOptions
   { scheduled :: Schedule
   -- ^ Which thread runs when several are enabled.
   , endAt :: Seconds
@@ -40,28 +40,28 @@ data Options = Options
   -- run is ended ('Livelock'); 100,000 by default.
   , realTimeLimit :: Seconds
   -- ^ After this amount of real time the run is ended ('TooSlow'); 9 s by default.
-  , slip :: Seconds
+  , timerSlip :: Seconds
   -- ^ A sleeper may be late by less than this: whenever the virtual time advances, the schedule
   -- may let it advance to any moment at which a sleeper is due, less than this after the first
   -- such moment. By default 0: timers are exact.
-  , detailed :: Bool
+  , detailedSteps :: Bool
   -- ^ Whether 'steps' contains every operation, and not only the starts and ends of threads,
   -- the exceptions that they receive, and their notes; by default 'False'.
   }
 
 -- | The non-preemptive schedule, no end, and the defaults that are documented for each field
--- of 'Options'.
+-- of 'SimOptions'.
 --
 -- @since 0.1.0.0
-defaults :: Options
-defaults =
-  Options
+defaultSimOptions :: SimOptions
+defaultSimOptions =
+  SimOptions
     { scheduled = NonPreemptive
     , endAt = 1 / 0
     , livelockLimit = 100000
     , realTimeLimit = 9
-    , slip = 0
-    , detailed = False
+    , timerSlip = 0
+    , detailedSteps = False
     }
 
 -- | Which thread runs when several are enabled.
@@ -91,9 +91,9 @@ data Run a = Run
   , events :: [Event]
   -- ^ The events of its trace ("Behavior.Trace"), with operators and branches. What had not ended
   -- when the run ended has no end.
-  , schedule :: Schedule
+  , runSchedule :: Schedule
   -- ^ The schedule that replays this run: a 'Preempting'.
-  , points :: Int
+  , runPoints :: Int
   -- ^ How many scheduling points the run had.
   , leakedThreads :: [Label]
   -- ^ The threads that had not ended when the run ended.
@@ -132,8 +132,8 @@ data Outcome a
 --
 -- @since 0.1.0.0
 data Waiting = Waiting
-  { who :: Label
-  , what :: String
+  { waitingThread :: Label
+  , waitingFor :: String
   }
   deriving (Eq, Show)
 
@@ -158,15 +158,15 @@ data Blocked
 --
 -- @since 0.1.0.0
 data Step = Step
-  { at :: !Seconds
-  , point :: !Int
+  { stepTime :: !Seconds
+  , stepPoint :: !Int
   -- ^ The number of the scheduling point.
-  , number :: !Int
+  , stepThread :: !Int
   -- ^ The number of the thread: threads are numbered from 0, in the order of their starts.
-  , label :: !Label
-  , parentNumber :: !Int
+  , stepLabel :: !Label
+  , stepParent :: !Int
   -- ^ The number of the thread that started this one; for the first thread -1.
-  , did :: StepKind
+  , stepKind :: StepKind
   }
   deriving (Eq, Show)
 

@@ -116,18 +116,18 @@ underSchedule body drawn = ioRose $ do
     -- While it is shrunk, which is after the exploration, the property may simulate again.
     let simulateBy explored act = maybe (explored act) (later act) =<< readIORef over
         later act chosen = do
-          run <- simulateWith (runOptions plan) {scheduled = chosen} act
+          run <- simulateWith (planOptions plan) {scheduled = chosen} act
           -- The schedule may not fit the shrunk values.
           when (isMismatch (outcome run)) discard
           modifyIORef shown (fmap (\c -> c {failingSteps = steps run}))
           pure run
-        plan = (replaying drawn) {search = how}
+        plan = (replaying drawn) {planSearch = how}
     found <- tryExplore plan $ \explored -> do
       rose@(MkRose result _) <- reduceRose (ioRose (body (simulateBy explored)))
       writeIORef latest rose
       for_ (theException result) $ \e -> when (isCancellation e) (throwIO e)
       when (falsified result) (throwIO Falsified)
-    writeIORef over (Just (either failing (const drawn) found))
+    writeIORef over (Just (either failingSchedule (const drawn) found))
     writeIORef shown (either Just (const Nothing) found)
     readIORef latest >>= explained shown
   isMismatch (ScheduleMismatch _) = True

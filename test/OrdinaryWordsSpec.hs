@@ -1,0 +1,90 @@
+{-# OPTIONS_GHC -Wno-unused-imports #-}
+
+-- |
+-- The names that a program has of its own, beside open imports of all public modules: that this module compiles is the
+-- test. A public module that took one of these words would make each use of it here an ambiguous one, which is an error.
+-- ("Behavior.Signal" is imported qualified.)
+--
+-- These ordinary words are taken: they are the language and the words of its tests, so a program that imports the module
+-- openly has to avoid them, or to hide them.
+--
+-- * "Behavior": attempt, both, failed, fallback, monitor, parallel, sleep
+-- * "Behavior.Message": dropped, receive, waiting
+-- * "Behavior.Parallel": await, decide, fork, pinned, scoped
+-- * "Behavior.STM": check, retry, and what else stm exports
+-- * "Behavior.Time": checkpoint, every, now, timeout
+-- * "Behavior.Trace": adopt, named
+-- * "Behavior.Sim": events, explain, explore, finished, outcome, randomly, scheduled, simulate, steps
+-- * "Behavior.Sim.Mock": action, always, begin, being, clear, condition, driver, during, eventually, exactly, fails,
+--   faults, hangs, happened, holds, never, note, noted, outside, reading, returning, running, sensor, set, signal,
+--   succeeds, taking, throws, verdict, whenever
+module OrdinaryWordsSpec (spec) where
+
+import Data.List (nub)
+import qualified Test.Hspec as Hspec
+
+import Behavior
+import Behavior.Message
+import Behavior.Parallel
+import Behavior.STM
+import qualified Behavior.Signal as Signal
+import Behavior.Sim
+import Behavior.Sim.Mock
+import Behavior.Time
+import Behavior.Trace
+
+spec :: Hspec.Spec
+spec = Hspec.it "leaves a hundred ordinary words to the programs that import its modules" $
+  length (nub ordinaryWords) `Hspec.shouldSatisfy` (>= 100)
+
+ordinaryWords :: [String]
+ordinaryWords =
+  [ angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, box, brake, call, camera, cancel,
+    capacity, cargo, charge, close, color, command, complete, config, contents, count, current, defaults, depth,
+    describe, detailed, did, direction, distance, dock, door, drive, duration, end, entries, failing, field, find,
+    forward, frame, front, full, goal, grasp, gripper, group, handle, heading, height, home, index, input, item, job,
+    joint, key, kind, label, left, level, lift, light, limit, line, load, location, lock, look, low, mass, measure,
+    message, mission, mode, model, motor, move, name, next, node, number, obstacle, offset, open, order, origin,
+    parent, part, path, pause, place, point, points, position, power, priority, progress, queue, radius, range, rate,
+    ready, reason, reset, result, right, robot, room, route, run, safe, scan, schedule, schedules, score, search,
+    seconds, send, size, slip, speed, start, state, status, step, stop, subject, subjects, table, target, task,
+    temperature, text, thread, tick, time, tool, total, turn, unit, update, value, velocity, wait, wall, weight, what,
+    wheel, who, width, world, zone
+  ]
+
+angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, box, brake, call, camera, cancel,
+  capacity, cargo, charge, close, color, command, complete, config, contents, count, current, defaults, depth,
+  describe, detailed, did, direction, distance, dock, door, drive, duration, end, entries, failing, field, find,
+  forward, frame, front, full, goal, grasp, gripper, group, handle, heading, height, home, index, input, item, job,
+  joint, key, kind, label, left, level, lift, light, limit, line, load, location, lock, look, low, mass, measure,
+  message, mission, mode, model, motor, move, name, next, node, number, obstacle, offset, open, order, origin, parent,
+  part, path, pause, place, point, points, position, power, priority, progress, queue, radius, range, rate, ready,
+  reason, reset, result, right, robot, room, route, run, safe, scan, schedule, schedules, score, search, seconds,
+  send, size, slip, speed, start, state, status, step, stop, subject, subjects, table, target, task, temperature,
+  text, thread, tick, time, tool, total, turn, unit, update, value, velocity, wait, wall, weight, what, wheel, who,
+  width, world, zone :: String
+angle = "angle"; area = "area"; argument = "argument"; arm = "arm"; arrived = "arrived"; at = "at"; axis = "axis"
+back = "back"; base = "base"; battery = "battery"; beacon = "beacon"; box = "box"; brake = "brake"; call = "call"
+camera = "camera"; cancel = "cancel"; capacity = "capacity"; cargo = "cargo"; charge = "charge"; close = "close"
+color = "color"; command = "command"; complete = "complete"; config = "config"; contents = "contents"
+count = "count"; current = "current"; defaults = "defaults"; depth = "depth"; describe = "describe"
+detailed = "detailed"; did = "did"; direction = "direction"; distance = "distance"; dock = "dock"; door = "door"
+drive = "drive"; duration = "duration"; end = "end"; entries = "entries"; failing = "failing"; field = "field"
+find = "find"; forward = "forward"; frame = "frame"; front = "front"; full = "full"; goal = "goal"; grasp = "grasp"
+gripper = "gripper"; group = "group"; handle = "handle"; heading = "heading"; height = "height"; home = "home"
+index = "index"; input = "input"; item = "item"; job = "job"; joint = "joint"; key = "key"; kind = "kind"
+label = "label"; left = "left"; level = "level"; lift = "lift"; light = "light"; limit = "limit"; line = "line"
+load = "load"; location = "location"; lock = "lock"; look = "look"; low = "low"; mass = "mass"; measure = "measure"
+message = "message"; mission = "mission"; mode = "mode"; model = "model"; motor = "motor"; move = "move"
+name = "name"; next = "next"; node = "node"; number = "number"; obstacle = "obstacle"; offset = "offset"
+open = "open"; order = "order"; origin = "origin"; parent = "parent"; part = "part"; path = "path"; pause = "pause"
+place = "place"; point = "point"; points = "points"; position = "position"; power = "power"; priority = "priority"
+progress = "progress"; queue = "queue"; radius = "radius"; range = "range"; rate = "rate"; ready = "ready"
+reason = "reason"; reset = "reset"; result = "result"; right = "right"; robot = "robot"; room = "room"
+route = "route"; run = "run"; safe = "safe"; scan = "scan"; schedule = "schedule"; schedules = "schedules"
+score = "score"; search = "search"; seconds = "seconds"; send = "send"; size = "size"; slip = "slip"; speed = "speed"
+start = "start"; state = "state"; status = "status"; step = "step"; stop = "stop"; subject = "subject"
+subjects = "subjects"; table = "table"; target = "target"; task = "task"; temperature = "temperature"; text = "text"
+thread = "thread"; tick = "tick"; time = "time"; tool = "tool"; total = "total"; turn = "turn"; unit = "unit"
+update = "update"; value = "value"; velocity = "velocity"; wait = "wait"; wall = "wall"; weight = "weight"
+what = "what"; wheel = "wheel"; who = "who"; width = "width"; world = "world"; zone = "zone"
