@@ -61,6 +61,7 @@ import qualified Sim.QuickCheckSpec
 import qualified Sim.RecordSpec
 import qualified Sim.SimulateSpec
 import qualified Sim.SlipSpec
+import qualified Sim.VacuousSpec
 import qualified Trace.MessagesSpec
 import qualified Trace.ProgramsSpec
 import qualified Trace.SinkSpec
@@ -116,6 +117,7 @@ main = hspec $ do
     Sim.ExploreSpec.spec
     Sim.RecordSpec.spec
     Sim.MockSpec.spec
+    Sim.VacuousSpec.spec
     Sim.QuickCheckSpec.spec
   describe "Traces" $ do
     Trace.TraceSpec.spec

@@ -122,10 +122,11 @@ taking' = do
 
   it "never ends when it hangs, until it is stopped" $ do
     mock <- newMock
-    wait <- action mock "wait" [hangs, hangs :: Script ()]
+    wait <- action mock "wait" [hangs :: Script ()]
     runSimulated (timeout 3600 wait) `shouldReturn` ("failed TimedOut 3600.0", 3600)
     mock `shouldRecord` withinSeconds 3600 (interruptionOf "wait")
-    runSimulated wait >>= (`shouldBe` "deadlock") . fst
+    forEver <- newMock >>= \another -> action another "wait" [hangs :: Script ()]
+    runSimulated forEver >>= (`shouldBe` "deadlock") . fst
 
 stopped :: Spec
 stopped = do
@@ -169,7 +170,7 @@ stopped = do
   it "does not begin when the request comes first" $ do
     mock <- newMock
     act <- action mock "act" [succeeds]
-    _ <- simulate (firstOf [pure (), sleep 0.5 >> act])
+    _ <- simulate (begin mock >> firstOf [pure (), sleep 0.5 >> act])
     mock `shouldRecord` never (startOf "act")
 
   it "completes where its caller is masked uninterruptibly" $ do
@@ -306,10 +307,10 @@ watched = do
     mock <- newMock
     low <- condition mock "low" [(0, False), (3600, True)]
     leavingNothing (Signal.rSelect (signal low) (pure 'l') (pure 'r')) `shouldReturn` 'r'
-    wet <- condition mock "wet" [(0, True)]
+    wet <- newMock >>= \another -> condition another "wet" [(0, True)]
     ran <- simulate (Signal.waitUntil (signal wet))
     [Sim.stepLabel step | step <- Sim.steps ran, Sim.stepKind step == Sim.Starts] `shouldNotContain` [Label "waitUntil" "clock"]
-    cold <- condition mock "cold" [(0, False), (1, True)]
+    cold <- newMock >>= \another -> condition another "cold" [(0, False), (1, True)]
     other <- simulate (Signal.waitUntil (signal cold))
     [Sim.stepLabel step | step <- Sim.steps other, Sim.stepKind step == Sim.Starts] `shouldContain` [Label "waitUntil" "clock"]
 

@@ -50,7 +50,7 @@ module Behavior.Internal.Runtime
   , annotate
   , reportUncaught
   , isRecorded
-  , runClock
+  , simulatedRun
   ) where
 
 import Control.Concurrent
@@ -386,6 +386,6 @@ reportUncaught e =
 isRecorded :: IO Bool
 isRecorded = inSimulation (pure True) recording
 
--- | How to read the clock of the simulation that the calling thread is part of, later too.
-runClock :: IO (Maybe (IO Seconds))
-runClock = inSimulation (pure Nothing) (pure . Just . lookAtClock)
+-- | The simulation that the calling thread is part of: its number, and how to read its clock, later too.
+simulatedRun :: IO (Maybe (Int, IO Seconds))
+simulatedRun = inSimulation (pure Nothing) (\simulation -> pure (Just (runNumber simulation, lookAtClock simulation)))

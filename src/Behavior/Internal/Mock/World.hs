@@ -41,6 +41,7 @@ import Behavior.Internal.Runtime
 
 -- $setup
 -- >>> import Behavior
+-- >>> import Behavior.Sim
 -- >>> import Behavior.Sim.Mock
 -- >>> mock <- newMock
 
@@ -48,10 +49,9 @@ import Behavior.Internal.Runtime
 --
 -- @since 0.1.0.0
 data Mock = Mock
-  { origin :: IORef (Maybe Seconds)
-  -- ^ When the world's clock was started.
-  , elapsed :: IORef (IO Seconds)
-  -- ^ How long the clock has run in a simulation, up to its end; in reality this is zero.
+  { beginning :: IORef (Maybe Beginning)
+  , misuse :: IORef (Maybe ErrorCall)
+  -- ^ The error of a use in another run than its own: that run may have lost it.
   , names :: IORef [String]
   , newestEntries :: IORef [RecordEntry]
   -- ^ Newest first.
@@ -59,16 +59,36 @@ data Mock = Mock
   -- ^ For each condition its changes that are due by a given time but not recorded yet.
   }
 
+-- | How a world's clock was started.
+data Beginning = Beginning
+  { ownRun :: Maybe Int
+  -- ^ The number of the simulation that it belongs to; 'Nothing' in reality.
+  , startTime :: Seconds
+  , elapsed :: IO Seconds
+  -- ^ How long the clock has run in that simulation, up to its end; in reality this is zero.
+  }
+
 -- | An empty world.
 --
 -- @since 0.1.0.0
 newMock :: IO Mock
-newMock = Mock <$> newIORef Nothing <*> newIORef (pure 0) <*> newIORef [] <*> newIORef [] <*> newIORef []
+newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
 
--- | Starts the clock of the world, if it is not running yet. Without this it starts
--- when the first action begins, or when a condition is read for the first time.
+-- | Starts the clock of the world, if it is not running yet. Without this it starts when the first
+-- action begins, or when a condition is read, watched or set for the first time.
+--
+-- A world belongs to the run in which its clock was started: one simulation, or reality. So begin it
+-- inside of the simulation:
+--
+-- > simulate (begin world >> mission)
+--
+-- [Fault] To use it in another run throws an 'ErrorCall', there and where its record is read. (The
+--   record itself can be read everywhere: 'happened', 'shouldRecord'.)
 --
 -- >>> begin mock
+-- >>> run <- simulate (begin mock)
+-- >>> putStrLn (explain (outcome run))
+-- it faulted: a world belongs to the run in which its clock was started; this world's was started outside of the simulation: there, call neither begin nor anything that uses the world (simulate (begin world >> ...) is right)
 --
 -- @since 0.1.0.0
 begin :: Mock -> Behavior ()
@@ -80,10 +100,22 @@ begin = void . clock
 clock :: Mock -> IO (Seconds, Seconds)
 clock mock = do
   t <- now
-  (zero, isFirst) <- atomicModifyIORef' (origin mock) $ \started ->
-    let zero = fromMaybe t started in (Just zero, (zero, isNothing started))
-  when isFirst $ runClock >>= mapM_ (writeIORef (elapsed mock) . fmap (subtract zero))
-  pure (zero, t)
+  here <- simulatedRun
+  let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
+  own <- atomicModifyIORef' (beginning mock) $ \begun -> let it = fromMaybe first begun in (Just it, it)
+  unless (ownRun own == ownRun first) $ do
+    writeIORef (misuse mock) (Just (belongsTo own first))
+    throwIO (belongsTo own first)
+  pure (startTime own, t)
+
+-- | A world that belongs to the first run is used in the second.
+belongsTo :: Beginning -> Beginning -> ErrorCall
+belongsTo own here = ErrorCall $
+  "a world belongs to the run in which its clock was started; this world's was started " ++ case (ownRun own, ownRun here) of
+    (Nothing, _) ->
+      "outside of the simulation: there, call neither begin nor anything that uses the world (simulate (begin world >> ...) is right)"
+    (_, Just _) -> "in another simulation: make a new one for each run (in an exploration: in the property)"
+    (_, Nothing) -> "in a simulation, which this thread is not part of: outside of it, only read its record (happened, shouldRecord)"
 
 -- | Adds an entry to the record. Where exceptions are masked, this neither blocks nor is
 -- interrupted. After the end of the run nothing is recorded.
@@ -135,12 +167,16 @@ checkTimes mayFollow rule times = for_ (zip (Nothing : map Just times) (take 100
 -- >>> map entryKind . recordEntries <$> happened mock
 -- [Begins,Succeeds]
 --
+-- [Fault] Throws the 'ErrorCall' again, if the world was used in a run that it does not belong to (see
+--   'begin').
+--
 -- @since 0.1.0.0
 happened :: Mock -> IO Record
 happened mock = do
+  readIORef (misuse mock) >>= mapM_ throwIO
   seen <- readIORef (newestEntries mock)
   conditions <- readIORef (pendingChanges mock)
-  came <- join (readIORef (elapsed mock))
+  came <- readIORef (beginning mock) >>= maybe (pure 0) elapsed
   due <- atomically (traverse ($ maximum (came : map entryTime seen)) conditions)
   known <- readIORef (names mock)
   pure (recorded (reverse known) (reverse (join due) ++ seen))
@@ -155,7 +191,12 @@ happened mock = do
 --
 -- @since 0.1.0.0
 shouldRecord :: Mock -> Claim -> IO ()
-shouldRecord mock claim = happened mock >>= either (throwIO . BrokenClaim) pure . verdict claim
+shouldRecord mock claim = do
+  record <- happened mock
+  begun <- readIORef (beginning mock)
+  either (throwIO . BrokenClaim) pure (verdict claim record)
+  when (isNothing begun) . throwIO . BrokenClaim $
+    "Nothing has used this world, so there is no record to hold. If that is right, begin it: simulate (begin world >> ...)"
 
 infix 1 `shouldRecord`
 

@@ -30,7 +30,9 @@ instance Show Label where
 
 -- | The simulation backend: how a simulation does the operations of its threads.
 data Simulator = Simulator
-  { isRunning :: ThreadId -> IO Bool
+  { runNumber :: Int
+  -- ^ Which simulation it is.
+  , isRunning :: ThreadId -> IO Bool
   -- ^ Whether this is the one thread of the simulation that runs at the moment.
   , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO (Async ())
   -- ^ Starts a thread, masked, and publishes its result when it ends. The thread is given an

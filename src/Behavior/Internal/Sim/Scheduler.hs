@@ -39,11 +39,12 @@ import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
 
--- | The backend that the seam calls.
-simulation :: Sim -> Simulator
-simulation sim =
+-- | The backend that the seam calls, for the simulation with this number.
+simulation :: Int -> Sim -> Simulator
+simulation n sim =
   Simulator
-    { isRunning = \self -> (== Just self) . taskThread <$> readIORef (current sim)
+    { runNumber = n
+    , isRunning = \self -> (== Just self) . taskThread <$> readIORef (current sim)
     , spawn = \name body publish -> do
         operation sim AlwaysEnabled
         me <- readIORef (current sim)

@@ -93,7 +93,7 @@ simulateBy o chooser' act = do
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
   sim <- newSim o chooser'
   root <- (`top` Top) <$> traceOf sim
-  mask $ \restore -> withBackend n (simulation sim) . watched n sim $ do
+  mask $ \restore -> withBackend n (simulation n sim) . watched n sim $ do
     let run unmasked = try (inPlace (Just root) unmasked) >>= writeIORef result . Just
     (main, _) <- launch sim (-1) (Label "main" "") (\begin unmask -> run (unmask (begin >> act))) (const (pure ()))
     writeIORef (current sim) main
