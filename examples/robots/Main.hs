@@ -165,5 +165,5 @@ fleetDemo say = do
   robots <- traverse (uncurry robot) [("Ann", 1.4), ("Bo", 60), ("Cid", 1.5)]
   begin world
   withInbox 10 orders $ \inbox ->
-    Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver))
+    named "all six orders" (Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver)))
       ||| fleet Fleet {Fleet.orders = inbox, Fleet.chargers = chargers, Fleet.logLine = say} robots

@@ -151,7 +151,7 @@ textInAllPlaces = concat . zipWith one [0 ..]
     within n parent kind begin reaction end how = [Began s, Ended s (start + end) how]
      where
       s = Span (7 * k + n) parent kind text (start + begin) reaction
-    changes = [Change text (Just text) text]
+    changes = [Change text (Just (text ++ "0")) text]
     start = 4 * fromIntegral k :: Seconds
 
 -- | No terminal acts on the character.

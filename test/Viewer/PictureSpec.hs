@@ -13,6 +13,7 @@ import Behavior.Trace.Recording
 import Behavior.Trace.Svg
 import Viewer.Examples
 import Viewer.Generate
+import Viewer.Shapes
 import Viewer.Xml
 
 spec :: Spec
@@ -23,6 +24,11 @@ spec = do
       title mission `shouldBe` "mission not ended after 40 s:interrupted once, 1 of its 10 parts failed, 1 faulted, 2 not ended2 events were lost"
       title (ended 1 Top "drive" 2 Nothing 4 (FailedWith "stuck")) `shouldBe` "drive failed after 2 s"
       title (ended 1 Top "drive" 2 Nothing 4 (StoppedBy (TimeLimit 2))) `shouldBe` "drive was stopped after 2 s"
+    it "by a signal that ended it" $ do
+      title buttoned `shouldBe` "mission was ended by red button True after 7 s:interrupted once"
+      -- Not if something began after that, or went on.
+      title (buttoned ++ ended 9 (Inside 1) "motors off" 6.5 Nothing 7 Succeeded) `shouldBe` "mission succeeded after 7 s:interrupted once"
+      title (buttoned ++ ended 9 (Inside 1) "film" 2 Nothing 6.8 Succeeded) `shouldBe` "mission succeeded after 7 s:interrupted once"
     it "of several spans that are in no other" $
       title (failing 3) `shouldBe` "2.9 s in all:3 of 3 parts failed"
     it "where changes interrupted nothing" $
@@ -31,31 +37,40 @@ spec = do
   describe "says where most of the time went" $ do
     it "at the level where it is divided" $
       whereMost watering `shouldBe` "water:29.5 s (79 %, twice),recharge:8 s (21 %)"
-    it "with what one name leaves of it to no other" $
+    it "with what has no name" $
       whereMost (ended 1 Top "mission" 0 Nothing 40 Succeeded ++ ended 2 (Inside 1) "bed 4" 0 Nothing 7 Succeeded)
-        `shouldBe` "mission itself:33 s (82 %),bed 4:7 s (18 %)"
+        `shouldBe` "waiting or unnamed:33 s (82 %),bed 4:7 s (18 %)"
     it "with the names inside, if there are many that took little" $
       [t | t <- texts (drawn (long 1000)), "the longest:" `isInfixOf` t, name <- ["look:", "open door:", "photograph:"], (name ++ "114 s (11 %, 143 times)") `isInfixOf` t]
         `shouldSatisfy` ((== 3) . length)
     it "with the time once in which a name ran twice" $
       whereMost (concat [ended k Top "arm" 0 Nothing 6 Succeeded | k <- [1, 2]] ++ ended 3 Top "wait" 6 Nothing 10 Succeeded)
         `shouldBe` "arm:6 s (60 %, twice),wait:4 s (40 %)"
-    it "with how many others there are" $
-      whereMost (legs 10 ++ ended 11 Top "home" 11 Nothing 15 Succeeded)
-        `shouldBe` "home:4 s (29 %),leg 1:1 s (7 %),leg 10:1 s (7 %),leg 2:1 s (7 %)and 7 others"
+    it "with the names of the others" $
+      whereMost (legs 9 ++ ended 11 Top "home" 10 Nothing 14 Succeeded)
+        `shouldBe` "home:4 s (31 %),leg a:1 s (8 %),leg b:1 s (8 %),leg c:1 s (8 %)and leg d, leg e, leg f, leg g, leg h, leg i"
+    it "with how many others there are, if their names have no room" $
+      whereMost (concat [ended k Top (toEnum (96 + k) : "leg in the north of the field") (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. 20]])
+        `shouldSatisfy` isInfixOf "and 18 others"
+    it "with those in a series as one" $
+      whereMost (concat [ended k Top ("leg " ++ show k) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. 10]] ++ ended 11 Top "home" 11 Nothing 15 Succeeded)
+        `shouldBe` "leg 1\8211\&10:10 s (71 %, 10 times),home:4 s (29 %)"
+    it "of several side by side: as the sum of their parts" $
+      [t | t <- texts (drawn (robots 3)), "side by side" `isInfixOf` t]
+        `shouldBe` ["3 side by side, together 18 s:drive:10.2 s (57 %),charge:6 s (33 %),waiting or unnamed:1.8 s (10 %)"]
     it "with other words, if no name took a fifth of it" $
-      [t | t <- texts (drawn (legs 10)), "leg 1:" `isInfixOf` t]
-        `shouldBe` ["spread over 10 parts, the longest:leg 1:1 s (10 %),leg 10:1 s (10 %),leg 2:1 s (10 %),leg 3:1 s (10 %)and 6 others"]
+      [t | t <- texts (drawn (legs 10)), "leg a:" `isInfixOf` t]
+        `shouldBe` ["spread over 10 parts, the longest:leg a:1 s (10 %),leg b:1 s (10 %),leg c:1 s (10 %),leg d:1 s (10 %)and leg e, leg f, leg g, leg h, leg i, leg j"]
     it "if nothing took time" $ whereMost (ended 1 Top "a" 1 Nothing 1 Succeeded) `shouldBe` "nothing took time"
     it "with shares of the whole" . property $ forAllBlind likelyEvents $ \events ->
-      let shares = [read (reverse (takeWhile isDigit (reverse known))) :: Int | (known, rest) <- splits (whereMost (map renamed events)), " %" `isPrefixOf` rest]
+      let shares = [read (reverse (takeWhile isDigit (reverse known))) :: Int | line <- texts (drawn (map renamed events)), any (`isInfixOf` line) ["most of the time:", "the longest:", "side by side"], (known, rest) <- splits line, " %" `isPrefixOf` rest]
        in counterexample (show shares) (length shares <= 4 && all (<= 100) shares)
 
   describe "explains" $ do
     it "the marks that it contains" $ do
       legend watering `shouldBe` ["succeeded", "stopped", "a signal changed → stopped → started", "a signal changed → started"]
       legend mission
-        `shouldBe` ["succeeded", "failed", "faulted", "stopped", "while stopping", "not ended", "a signal changed → stopped → started", "a signal changed → started"]
+        `shouldBe` ["succeeded", "failed", "faulted", "stopped", "while stopping", "not ended", "waiting, or unnamed", "a signal changed → stopped → started", "a signal changed → started"]
       legend (mixed 10000) `shouldBe` ["succeeded", "failed", "faulted", "stopped", "short spans, together"]
     it "no others" $ do
       legend (ended 1 Top "a" 0 Nothing 1 Succeeded) `shouldBe` ["succeeded"]
@@ -81,6 +96,46 @@ spec = do
     it "a lane is higher, if texts below it have two lines" $
       attributeOf "height" (drawn doors) - attributeOf "height" (drawn (map withoutReason doors)) `shouldBe` 13
 
+  describe "of interruptions" $ do
+    it "names the value of each, of five within two seconds in a minute" $
+      texts (drawn crowded) `shouldSatisfy` \known -> and [any (("obstacle " ++ show k) `isPrefixOf`) known | k <- [2 .. 6 :: Int]]
+    it "names the first value, if there are more at a place than have room" $
+      [t | t <- texts (drawn (crowdedBy 50 0.001)), "obstacle 2" `isPrefixOf` t] `shouldSatisfy` any ("and 49 interruptions" `isInfixOf`)
+    it "leaves out what did not change" $
+      texts (drawn (map (withChange (Change "outside" (Just "False") "False")) watering))
+        `shouldSatisfy` \known -> any ("battery 18" `isPrefixOf`) known && not (any ("outside" `isInfixOf`) known)
+    it "has no arrow over a bar" $ [n | n <- [1 .. 9], not (null (crossed (drawn (robots n))))] `shouldBe` []
+
+  describe "shows what runs nowhere" $ do
+    it "as waiting for the signal that ended it" $
+      texts (drawn waited) `shouldSatisfy` elem "waiting until order True"
+    it "as a time, if it is not known what it was" $
+      texts (drawn [e | e <- waited, not (isReaction e)]) `shouldSatisfy` \known -> "5 s" `elem` known && not (any ("waiting until" `isInfixOf`) known)
+    it "not as waiting, if a monitor's recovery has run" $
+      texts (drawn (map (byOperator "monitor") waited)) `shouldSatisfy` \known -> "5 s" `elem` known && not (any ("waiting until" `isInfixOf`) known)
+    it "with no text over its line" $
+      [(l, t) | t@(y', left, right) <- pauseTexts waited, l@(y, a, b) <- pauseLines waited, abs (y' - 4 - y) < 1, a < right, b > left] `shouldBe` []
+
+  describe "names the part that finished" $ do
+    it "so that others were stopped" $
+      texts (drawn (beside 5)) `shouldSatisfy` elem "listenstopped: \"look\" finished"
+    it "not one that ended earlier" $
+      texts (drawn (beside 4)) `shouldSatisfy` elem "listenstopped: the left branch finished"
+
+  describe "has another mark for what succeeded in vain" $ do
+    let marked events = [head (lines (textOf b)) | b <- allOf "path" (drawn events), "a" `elem` words (attribute "class" b), not (null (textOf b))]
+    it "and ran again" $ marked wateredAgain `shouldBe` ["bed 1", "bed 2"]
+    it "not if it did not run again" $ marked [e | e <- wateredAgain, notBed "bed 1" e || not (isLater e)] `shouldBe` ["bed 2"]
+    it "not if what it ran in succeeded" $ marked (map succeeding wateredAgain) `shouldBe` []
+    it "and its text says that" $ texts (drawn wateredAgain) `shouldSatisfy` elem "bed 15 s, ran again"
+
+  it "cuts no name to less than six letters" . property $ forAllBlind likelyEvents $ \events ->
+    let cut = [t | g <- allOf "g" (drawn (map (renamedTo "investigate the north wall") events)), attribute "class" g == "l", t <- map textOf (allOf "text" g), "in" `isPrefixOf` t, '…' `elem` t]
+     in counterexample (show cut) (all ((> 6) . length) cut)
+
+  it "has a legend that is no wider than the picture" . property $ forAllBlind likelyEvents $ \events ->
+    conjoin [counterexample (textOf t) (attributeOf "x" t + 6.5 * fromIntegral (length (textOf t)) <= 1200) | g <- allOf "g" (drawn events), attribute "class" g == "le", t <- allOf "text" g]
+
   it "has a line to each text that is outside of its bar" $ do
     let events = ended 1 Top "mission" 0 Nothing 100 Succeeded ++ ended 2 (Inside 1) "photograph" 50 Nothing 51 Succeeded
         ends = [d | e <- allOf "path" (drawn events), attribute "class" e == "ld", let d = attribute "d" e]
@@ -104,7 +159,7 @@ title events = head [textOf t | t <- allOf "text" (drawn events), attribute "cla
 
 -- One after the other, a second each.
 legs :: Int -> [Event]
-legs n = concat [ended k Top ("leg " ++ show k) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. n]]
+legs n = concat [ended k Top ("leg " ++ [toEnum (96 + k)]) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. n]]
 
 whereMost :: [Event] -> String
 whereMost events = head [rest | t <- texts (drawn events), begin <- ["most of the time:", "the longest:"], Just rest <- map (stripPrefix begin) (tails t)]
@@ -173,3 +228,124 @@ locked =
   ended 1 Top "mission" 0 Nothing 10 Succeeded
     ++ ended 2 (Inside 1) "open front door" 0 Nothing 1 (FailedWith "the front door is locked")
     ++ ended 3 (Inside 1) "open back door" 1 Nothing 2 (FailedWith "the back door is locked")
+
+-- The red button ends a mission.
+buttoned :: [Event]
+buttoned =
+  ended 1 Top "mission" 0 Nothing 7 Succeeded
+    ++ ended 2 (Inside 1) "load" 0 Nothing 2 Succeeded
+    ++ ended 3 (Inside 1) "drive" 2 Nothing 6 (StoppedBy (SignalChanged 4 changes))
+    ++ [Reacted (Reaction 4 (Inside 1) "insteadWhen" 6 changes (Just (StoppedBranch "branch" 4 0 (StoppedBy (SignalChanged 4 changes)))) (Just "emergency"))]
+ where
+  changes = [Change "red button" (Just "False") "True"]
+
+crowded :: [Event]
+crowded = crowdedBy 5 0.4
+
+-- That many interruptions in a minute, with so much time from one to the next.
+crowdedBy :: Int -> Seconds -> [Event]
+crowdedBy n apart = ended 1 Top "mission" 0 Nothing 60 Succeeded ++ concatMap one [1 .. n]
+ where
+  one k =
+    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) Nothing (at k) (StoppedBy (SignalChanged (3 * k + 1) (changes k)))
+      ++ [Reacted (Reaction (3 * k + 1) (Inside 1) "switch" (at k) (changes k) (Just (StoppedBranch "branch" 0.4 0 (StoppedBy (SignalChanged (3 * k + 1) (changes k))))) (Just "branch"))]
+  at k = if k == 0 then 0 else 30 + apart * fromIntegral k
+  changes k = [Change "obstacle" (Just (show k)) (show (k + 1))]
+
+withChange :: Change -> Event -> Event
+withChange change event = case event of
+  Reacted r -> Reacted r {reactionChanges = reactionChanges r ++ [change]}
+  _ -> event
+
+-- Several robots side by side, each of which is interrupted.
+robots :: Int -> [Event]
+robots n = ended 1 Top "mission" 0 Nothing 6 Succeeded ++ concatMap robot [1 .. n]
+ where
+  robot k =
+    ended (10 * k) (Inside 1) ("robot " ++ show k) 0 Nothing 6 Succeeded
+      ++ ended (10 * k + 1) (Inside (10 * k)) "drive" 0 Nothing (2 + at k) (StoppedBy (SignalChanged (10 * k + 2) low))
+      ++ [Reacted (Reaction (10 * k + 2) (Inside (10 * k)) "monitor" (2 + at k) low (Just (StoppedBranch "task" (2 + at k) 0 (StoppedBy (SignalChanged (10 * k + 2) low)))) (Just "recovery"))]
+      ++ ended (10 * k + 3) (Inside (10 * k)) "charge" (2 + at k) (Just (10 * k + 2)) (4 + at k) Succeeded
+      ++ ended (10 * k + 4) (Inside (10 * k)) "drive" (4 + 2 * at k) Nothing 6 Succeeded
+  at k = 0.3 * fromIntegral (k `mod` 4) :: Seconds
+  low = [Change "battery low" (Just "False") "True"]
+
+-- The arrows from markers that go through a bar.
+crossed :: Xml -> [(Double, Double)]
+crossed picture =
+  [ (x, top)
+  | a <- allOf "path" picture
+  , attribute "class" a == "ar"
+  , 'V' `elem` attribute "d" a
+  , (x : _, y : y' : _) <- [outline (attribute "d" a)]
+  , b <- allOf "path" picture
+  , "b" `elem` words (attribute "class" b)
+  , not (null (textOf b))
+  , (xs@(_ : _), ys) <- [outline (attribute "d" b)]
+  , let top = minimum ys
+  , minimum xs < x - 1 && maximum xs > x + 1 && top > y && top < y'
+  ]
+
+-- An order comes after a while.
+waited :: [Event]
+waited =
+  ended 1 Top "mission" 0 Nothing 10 Succeeded
+    ++ ended 2 (Inside 1) "drive" 0 Nothing 2 Succeeded
+    ++ [Reacted (Reaction 3 (Inside 1) "waitUntil" 7 [Change "order" (Just "False") "True"] Nothing Nothing)]
+    ++ ended 4 (Inside 1) "carry" 7 Nothing 10 Succeeded
+
+isReaction :: Event -> Bool
+isReaction event = case event of
+  Reacted _ -> True
+  _ -> False
+
+byOperator :: String -> Event -> Event
+byOperator operator event = case event of
+  Reacted r -> Reacted r {reactionOperator = operator}
+  _ -> event
+
+-- The lines of pauses: where, from where, to where; and their texts.
+pauseLines, pauseTexts :: [Event] -> [(Double, Double, Double)]
+pauseLines events = [(y, a, b) | p <- allOf "path" (drawn events), attribute "class" p == "wt", not (null (textOf p)), (a : b : _, y : _) <- [outline (attribute "d" p)]]
+pauseTexts events = [(attributeOf "y" t, middle - half, middle + half) | t <- allOf "text" (drawn events), attribute "class" t == "n q c", let middle = attributeOf "x" t, let half = 2.6 * fromIntegral (length (textOf t))]
+
+-- Two parts side by side; one of them ends at that time.
+beside :: Seconds -> [Event]
+beside t =
+  ended 1 Top "mission" 0 Nothing 10 Succeeded
+    ++ ended 2 (Inside 1) "look" 0 Nothing t Succeeded
+    ++ ended 3 (Inside 1) "listen" 0 Nothing 5 (StoppedBy (SiblingFinished "left"))
+
+-- Beds are watered; after an interruption, from the first one on.
+wateredAgain :: [Event]
+wateredAgain =
+  ended 1 Top "mission" 0 Nothing 30 Succeeded
+    ++ ended 2 (Inside 1) "water" 0 Nothing 12 (StoppedBy (SignalChanged 9 [Change "low" Nothing "True"]))
+    ++ ended 3 (Inside 2) "bed 1" 0 Nothing 5 Succeeded
+    ++ ended 4 (Inside 2) "bed 2" 5 Nothing 10 Succeeded
+    ++ ended 5 (Inside 1) "water" 15 Nothing 30 Succeeded
+    ++ ended 6 (Inside 5) "bed 1" 15 Nothing 20 Succeeded
+    ++ ended 7 (Inside 5) "bed 2" 20 Nothing 25 Succeeded
+
+succeeding :: Event -> Event
+succeeding event = case event of
+  Ended s t _ -> Ended s t Succeeded
+  _ -> event
+
+notBed :: String -> Event -> Bool
+notBed bed event = case event of
+  Began s -> spanName s /= bed
+  Ended s _ _ -> spanName s /= bed
+  _ -> True
+
+isLater :: Event -> Bool
+isLater event = case event of
+  Began s -> spanBegan s > 12
+  Ended s _ _ -> spanBegan s > 12
+  _ -> False
+
+renamedTo :: String -> Event -> Event
+renamedTo name event = case event of
+  Began s -> Began s {spanName = name}
+  Ended s t end -> Ended s {spanName = name} t end
+  _ -> event

@@ -1,7 +1,6 @@
 module Viewer.SvgSpec (spec) where
 
-import Data.Bifunctor (first)
-import Data.Char (isDigit, isSpace)
+import Data.Char (isDigit)
 import Data.List (isInfixOf, isPrefixOf, nub, (\\))
 import qualified Data.Text.Lazy as Lazy
 import Test.Hspec hiding (after)
@@ -15,6 +14,7 @@ import Behavior.Trace.Svg
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
+import Viewer.Shapes
 import Viewer.Xml
 
 spec :: Spec
@@ -174,44 +174,10 @@ count m = case words (textOf m) of
 num :: String -> Xml -> Double
 num name = head . (++ [0]) . numbers . attribute name
 
--- The numbers of a path.
-numbers :: String -> [Double]
-numbers text = maybe [] (\(n, rest) -> n : numbers rest) (nextNumber text)
-
-nextNumber :: String -> Maybe (Double, String)
-nextNumber text = case dropWhile (\c -> not (isDigit c || c == '-')) text of
-  [] -> Nothing
-  '-' : rest -> first negate <$> nextNumber rest
-  rest | (digits, after) <- span (\c -> isDigit c || c == '.') rest -> Just (read (if '.' `elem` digits then digits else digits ++ ".0"), after)
-
 pathWidth :: Xml -> Double
 pathWidth m = maximum xs - minimum xs
  where
   (xs, _) = outline (attribute "d" m)
-
--- The points of an outline.
-outline :: String -> ([Double], [Double])
-outline = go (0, 0)
- where
-  go (x, y) d = case dropWhile isSpace d of
-    'M' : rest | ([a, b], rest') <- arguments 2 rest -> at (a, b) rest'
-    'H' : rest | ([a], rest') <- arguments 1 rest -> at (a, y) rest'
-    'V' : rest | ([b], rest') <- arguments 1 rest -> at (x, b) rest'
-    'h' : rest | ([a], rest') <- arguments 1 rest -> at (x + a, y) rest'
-    'v' : rest | ([b], rest') <- arguments 1 rest -> at (x, y + b) rest'
-    'l' : rest | ([a, b], rest') <- arguments 2 rest -> at (x + a, y + b) rest'
-    'L' : rest | ([a, b], rest') <- arguments 2 rest -> at (a, b) rest'
-    'C' : rest | ([_, _, _, _, a, b], rest') <- arguments 6 rest -> at (a, b) rest'
-    'q' : rest | ([_, _, a, b], rest') <- arguments 4 rest -> at (x + a, y + b) rest'
-    'Z' : rest -> go (x, y) rest
-    _ -> ([], [])
-   where
-    at (a, b) rest = let (xs, ys) = go (a, b) rest in (a : xs, b : ys)
-  arguments :: Int -> String -> ([Double], String)
-  arguments 0 rest = ([], rest)
-  arguments n rest = case nextNumber rest of
-    Just (v, after) | (vs, after') <- arguments (n - 1) after -> (v : vs, after')
-    Nothing -> ([], rest)
 
 renamed :: String -> Event -> Event
 renamed name event = case event of

@@ -16,6 +16,7 @@ module Behavior.Internal.Trace.Text
   , startedText
   , startsText
   , changesText
+  , changedOnly
   , endText
   , howText
   , causeText
@@ -95,7 +96,7 @@ reactionText spans started r = intercalate " -> " (changed ++ done)
 reactionParts :: [(String, Seconds)] -> Maybe String -> Reaction -> ([String], [String])
 reactionParts spans started r = (changed, maybe [] stopped (reactionStopped r) ++ startsText started r)
  where
-  changed = case reactionChanges r of
+  changed = case changedOnly (reactionChanges r) of
     [] -> [nameText (reactionOperator r) ++ " changed"]
     changes -> map changeText changes
   stopped b = [stoppedAfterText spans (reactionTime r) b ++ took b]
@@ -146,12 +147,27 @@ startsText started r = [maybe "starts " (const "") (reactionStopped r) ++ starte
 -- "battery 9.4 (was 100) -> batteryLow True (was False)"
 -- >>> changesText []
 -- "a signal changed"
+--
+-- A value that did not change is left out where another one did.
+--
+-- >>> changesText (Change "outside" (Just "False") "False" : changes)
+-- "battery 9.4 (was 100) -> batteryLow True (was False)"
+-- >>> changesText [Change "outside" (Just "False") "False"]
+-- "outside False"
 changesText :: [Change] -> String
-changesText [] = "a signal changed"
-changesText changes = intercalate " -> " (map changeText changes)
+changesText changes = case changedOnly changes of
+  [] -> "a signal changed"
+  known -> intercalate " -> " (map changeText known)
+
+-- | Those whose value is another one than before; all, if there are none.
+changedOnly :: [Change] -> [Change]
+changedOnly changes = if any differs changes then filter differs changes else changes
+
+differs :: Change -> Bool
+differs c = changeBefore c /= Just (changeAfter c)
 
 changeText :: Change -> String
-changeText (Change signal before after) = nameText signal ++ " " ++ inertUpTo 200 after ++ maybe "" was before
+changeText c = nameText (changeSignal c) ++ " " ++ inertUpTo 200 (changeAfter c) ++ (if differs c then maybe "" was (changeBefore c) else "")
  where
   was value = " (was " ++ inertUpTo 200 value ++ ")"
 
@@ -183,15 +199,29 @@ endWith after end = case end of
     Just (':' : ' ' : reason) -> reason
     _ -> why
 
--- | Why a span was stopped.
+-- | Why a span was stopped. A branch that has no name but its position is called by that.
+--
+-- >>> map (causeText . SiblingFinished) ["left", "2", "1, 3", "lidar"]
+-- ["the left branch finished","branch 2 finished","branches 1, 3 finished","\"lidar\" finished"]
 causeText :: Cause -> String
 causeText cause = case cause of
   SignalChanged _ changes -> changesText changes
-  SiblingFinished name -> quoted name ++ " finished"
-  SiblingFailed name -> quoted name ++ " failed"
+  SiblingFinished name -> siblingText name ++ " finished"
+  SiblingFailed "sensor" -> "a sensor failed"
+  SiblingFailed name -> siblingText name ++ " failed"
   TimeLimit limit -> "time limit of " ++ secondsText limit
   FromOutside why -> "cancelled from outside" ++ (if null why then "" else ": " ++ inert why)
   WasAbandoned -> "abandoned, it may still run"
+
+siblingText :: String -> String
+siblingText name
+  | name `elem` ["left", "right"] = "the " ++ name ++ " branch"
+  | name == "all" = "all branches"
+  | [(_, "")] <- numbers = "branch " ++ name
+  | all (`elem` "0123456789, ") name, not (null name) = "branches " ++ name
+  | otherwise = quoted name
+ where
+  numbers = reads name :: [(Int, String)]
 
 -- | A duration, with three digits that count.
 --

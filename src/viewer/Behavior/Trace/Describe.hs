@@ -20,6 +20,7 @@ module Behavior.Trace.Describe
   , howText
   , causeText
   , changesText
+  , changedOnly
   , reactionText
   , reactionParts
   , stoppedText

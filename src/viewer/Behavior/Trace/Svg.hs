@@ -25,6 +25,10 @@ import Behavior.Trace.Svg.Interruptions
 import Behavior.Trace.Svg.Labels
 import Behavior.Trace.Svg.Layout
 import Behavior.Trace.Svg.Legend
+import Behavior.Trace.Svg.Outcome
+import Behavior.Trace.Svg.Pauses
+import Behavior.Trace.Svg.Siblings
+import Behavior.Trace.Svg.TimeSpent
 
 -- | The recording as an SVG file: the time from left to right, each span as a bar below the one
 -- that it runs in. The colour and the right end of a bar say how it ended. An interruption is an
@@ -36,39 +40,47 @@ import Behavior.Trace.Svg.Legend
 --
 -- @since 0.1.0.0
 timeline :: Recording -> Lazy.Text
-timeline r =
+timeline recorded =
   document
     width
     (bottom + margin)
-    (titleText r)
+    (titleText outcomeOf r)
     [ shape "g" (Text.concat ["M0 0H", px width, "V", px (bottom + margin), "H0Z"])
-    , textAt "t" margin 34 (title (width - 2 * margin) r)
+    , textAt "t" margin 34 (title outcomeOf (width - 2 * margin) r)
     , textAt "" margin 56 (whereTimeWent (width - 2 * margin) r)
-    , legend margin used
+    , explained
     , group "ax" (concatMap tick (ticks (fromSeconds total)))
     , group "" (map (bar (if null (drop 200 drawn) then 300 else 60) y barHeight r stopRequests) drawn)
+    , group "pa" (concatMap drawnPause idle)
     , interruptionArrows interruptions
     , group "l" (concat [labelDrawn l (y (labelLane l)) | l <- texts])
     , interruptionLabels interruptions
     ]
  where
+  r = withSiblings recorded
   placed = place (\n -> (x (spanBegan (nodeSpan n)), x (nodeUntil r n))) (roots r)
-  drawn = marks 800 placed
+  outcomeOf = outcomes r
+  drawn = marks outcomeOf 800 placed
+  idle = pauses x r placed
   lanes = if null placed then 1 else 1 + maximum (map placedLane placed)
   (barHeight, gap) = if lanes <= 16 then (24, 16) else (16, 7)
-  interruptions = layInterruptions margin (width - margin) bandTop (barHeight, gap) x y placed r
+  interruptions = layInterruptions margin (width - 8) (barHeight, gap) x y placed [(pauseLane p, (pauseLeft p, pauseRight p)) | p <- idle] r
   texts = labels (gap > 10) (width - 4) barHeight (interruptionsBelow interruptions) drawn
+  (explained, further) = legend margin (width - margin) used
+  axisTop = 112 + further
   used =
     Used
       { usedOutcomes = map markOutcome drawn
       , usedStopping = any (isJust . stoppingFrom stopRequests) drawn
       , usedChanges = interruptionEffects interruptions
+      , usedPauses = not (null idle)
       , usedMerged = any isMerged drawn
       }
-  -- A lane with two lines of text below its bars is higher.
+  -- Above a lane are the interruptions of what is in it. One with two lines of text below its bars is higher.
   y lane = fromMaybe 0 (IntMap.lookup lane tops)
-  tops = IntMap.fromList (zip [0 .. lanes] (scanl (+) (interruptionsBottom interruptions + 14) (map height [0 ..])))
-  height lane = barHeight + gap + (if IntSet.member lane higher then 13 else 0)
+  tops = IntMap.fromList (zip [0 ..] (zipWith (+) (scanl (+) (axisTop + 24) (map height [0 .. lanes - 1])) (map above [0 .. lanes])))
+  above lane = maybe 0 (+ aboveBars) (IntMap.lookup lane (interruptionsAbove interruptions))
+  height lane = above lane + barHeight + gap + (if IntSet.member lane higher then 13 else 0)
   higher = IntSet.fromList [labelLane l | l <- texts, labelLinesBelow l > 1]
   bottom = y lanes
   total = until r - from r
@@ -82,13 +94,18 @@ timeline r =
     ]
    where
     x' = x . (from r +) . realToFrac
+  -- What is free of texts beside bars.
+  free p = foldl without (pauseLeft p, pauseRight p) [l | l <- texts, labelLane l == pauseLane p, labelLinesBelow l == 0]
+  without (a, b) l
+    | labelTo l <= a || labelFrom l >= b = (a, b)
+    | labelFrom l + labelTo l < a + b = (labelTo l + 2, b)
+    | otherwise = (a, labelFrom l - 2)
+  drawnPause p = pauseDrawn (free p) (y (pauseLane p)) barHeight p
   stopRequests = IntMap.fromList [(reactionNumber a, x (reactionTime a)) | a <- reactions r]
 
-width, margin, axisTop, bandTop :: Double
+width, margin :: Double
 width = 1200
 margin = 30
-axisTop = 112
-bandTop = 128
 
 fromSeconds :: Seconds -> Double
 fromSeconds = realToFrac
@@ -108,7 +125,7 @@ bar limit y h r stopRequests m
   | otherwise = group "" (path (Text.unwords ["b", class']) (barShape outcome (markLeft m) top w h) about : stopping)
  where
   outcome = markOutcome m
-  class' = if isMerged m && outcome == Success && w >= 3 then "v2 s" else outcomeClass outcome
+  class' = if isMerged m && outcome `elem` [Success, RanAgain] && w >= 3 then "v2 " <> outcomeClass outcome else outcomeClass outcome
   top = y (markLane m)
   w = markRight m - markLeft m
   about = titled $ if isMerged m then severalSpans m else aboutSpan limit r (markNode m)
@@ -129,6 +146,7 @@ severalSpans m = [some (markCount m) "span" ++ how, list (map (inertUpTo 60 . na
  where
   how = case markOutcome m of
     Success -> ""
+    RanAgain -> ""
     Failure -> " failed"
     Fault -> " faulted"
     Stop -> " stopped"

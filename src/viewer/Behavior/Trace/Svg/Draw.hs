@@ -36,7 +36,7 @@ import Graphics.Svg.Core
 import Numeric (showFFloat, showHex)
 
 import Behavior.Trace.Describe (inert)
-import Behavior.Trace.Svg.Layout (Outcome (..))
+import Behavior.Trace.Svg.Outcome
 
 -- | A class and a text in it.
 type Part = (Text, String)
@@ -106,6 +106,7 @@ partSpace = 7
 outcomeClass :: Outcome -> Text
 outcomeClass o = case o of
   Success -> "s"
+  RanAgain -> "a"
   Failure -> "f"
   Fault -> "x"
   Stop -> "p"
@@ -115,16 +116,18 @@ outcomeClass o = case o of
 -- it faulted, cut off if it was stopped, and open if it was still running.
 barShape :: Outcome -> Double -> Double -> Double -> Double -> Text
 barShape outcome x y w h = Text.concat $ case outcome of
-  Success ->
-    ["M", px (x + r), " ", px y, "H", px (x + w - r), "q", px r, " 0 ", px r, " ", px r]
-      ++ ["V", px (y + h - r), "q0 ", px r, " ", px (-r), " ", px r]
-      ++ ["H", px (x + r), "q", px (-r), " 0 ", px (-r), " ", px (-r)]
-      ++ ["V", px (y + r), "q0 ", px (-r), " ", px r, " ", px (-r), "Z"]
+  RanAgain -> rounded
+  Success -> rounded
   Failure -> corner ++ line (-n) (h / 2) ++ line n (h / 2) ++ back
   Fault -> corner ++ concat (replicate 2 (line (-n) (h / 4) ++ line n (h / 4))) ++ back
   Stop -> corner ++ line (-n) h ++ back
   Running -> ["M", px (x + w), " ", px y, "H", px x, "V", px (y + h), "H", px (x + w)]
  where
+  rounded =
+    ["M", px (x + r), " ", px y, "H", px (x + w - r), "q", px r, " 0 ", px r, " ", px r]
+      ++ ["V", px (y + h - r), "q0 ", px r, " ", px (-r), " ", px r]
+      ++ ["H", px (x + r), "q", px (-r), " 0 ", px (-r), " ", px (-r)]
+      ++ ["V", px (y + r), "q0 ", px (-r), " ", px r, " ", px (-r), "Z"]
   r = min 3 (w / 2)
   n = min 8 (w / 2)
   corner = ["M", px x, " ", px y, "H", px (x + w)]
@@ -181,6 +184,7 @@ patterns =
   hatch "bt-f" 7 "fh" [diagonal 7]
     <> hatch "bt-x" 6 "xh" [diagonal 6, "M0 0L6 6"]
     <> hatch "bt-s" 5 "sh" ["M0 2.5H5"]
+    <> hatch "bt-a" 9 "ah" [diagonal 9]
  where
   hatch name size c ds =
     makeElement "pattern" (ground size c <> mconcat (map (shape c) ds))
@@ -220,16 +224,20 @@ style =
       , rule "text" "fill" ink
       , rule ".q" "fill" muted
       , ".bt .s{fill:" <> ok <> ";stroke:" <> okEdge <> "}"
+      , ".bt .a{fill:url(#bt-a);stroke:" <> okEdge <> ";stroke-dasharray:5 2}"
       , ".bt .f{fill:url(#bt-f);stroke:" <> badEdge <> "}"
       , ".bt .x{fill:url(#bt-x);stroke:" <> faultEdge <> "}"
       , ".bt .p{fill:" <> stop <> ";stroke:" <> stopEdge <> "}"
       , ".bt .r{fill:" <> run <> ";stroke:" <> runEdge <> "}"
       , ".bt .h{fill:url(#bt-s);stroke:none}.bt .v2{opacity:.55}"
       , rule ".m.s" "fill" okEdge
+      , rule ".m.a" "fill" okEdge
       , rule ".m.f" "fill" badEdge
       , rule ".m.x" "fill" faultEdge
       , rule ".m.p" "fill" stopEdge
       , rule ".m.r" "fill" runEdge
+      , rule ".ahb" "fill" ground
+      , rule ".ah" "stroke" ok
       , rule ".fhb" "fill" bad
       , rule ".fh" "stroke" badHatch
       , rule ".xhb" "fill" fault
@@ -241,8 +249,10 @@ style =
       , rule ".i" "fill" arrow
       , ".bt .io{fill:" <> ground <> ";stroke:" <> arrow <> "}"
       , rule ".ld" "stroke" muted
+      , ".bt .wt{stroke:" <> muted <> ";stroke-dasharray:1 5;stroke-width:2;stroke-linecap:round}"
       , rule ".l text,.bt .il text" "stroke" ground
       , rule ".l .os" "stroke" ok
+      , rule ".l .oa" "stroke" ground
       , rule ".l .of" "stroke" bad
       , rule ".l .ox" "stroke" fault
       , rule ".l .op" "stroke" stop

@@ -5,7 +5,8 @@
 module Behavior.Trace.Svg.Interruptions
   ( Interruptions
   , layInterruptions
-  , interruptionsBottom
+  , interruptionsAbove
+  , aboveBars
   , interruptionArrows
   , interruptionLabels
   , interruptionsBelow
@@ -16,8 +17,8 @@ module Behavior.Trace.Svg.Interruptions
 
 import Data.Bifunctor (bimap)
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (intercalate, nub, nubBy, sortOn)
-import Data.Maybe (fromMaybe, isJust, isNothing, listToMaybe, mapMaybe)
+import Data.List (nub, nubBy, sortOn)
+import Data.Maybe (isJust, listToMaybe)
 import Data.Text (Text)
 import qualified Data.Text as Text
 import Graphics.Svg.Core (Element)
@@ -28,11 +29,12 @@ import Behavior.Trace.Describe
 import Behavior.Trace.Recording (Node (..), Recording (reactions), reactionSpans)
 import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Layout
+import Behavior.Trace.Svg.Rows
 
 -- | Where the interruptions are drawn.
 data Interruptions = Interruptions
-  { interruptionsBottom :: !Double
-  -- ^ The lower end of their labels, where the lanes may begin.
+  { interruptionsAbove :: IntMap.IntMap Double
+  -- ^ How much room they need above the lanes that have some ('aboveBars' is not counted).
   , interruptionArrows :: Element
   -- ^ The markers, and what leads from them.
   , interruptionLabels :: Element
@@ -47,37 +49,36 @@ data Interruptions = Interruptions
 data Effect = Interrupts | OnlyStarts
   deriving (Eq, Show)
 
--- Reactions whose markers would be at the same place.
-data Marker = Marker
-  { markerX :: !Double
-  , markerReactions :: [Reaction]
-  }
-
--- Its row, and the label if there is room for one: where it begins, how wide it is, and its parts.
-type Label = (Int, Maybe (Double, Double, [Part]))
-
--- | Given the pixels between which they are, and where the rows of their labels begin; the height
--- of a bar, and the space between two; where a time and where a lane is; the spans; the recording. Only the arrows
--- depend on where the lanes are.
+-- | Given the pixels between which they are; the height of a bar, and the space between two; where a time is, and
+-- where a lane is, with what is above it; the spans; in which lane and between which pixels nothing runs that has a name;
+-- the recording. Only what is drawn depends on where the lanes are.
 layInterruptions
-  :: Double -> Double -> Double -> (Double, Double) -> (Seconds -> Double) -> (Int -> Double) -> [Placed] -> Recording -> Interruptions
-layInterruptions left right top (barHeight, gap) x y placed recorded =
+  :: Double -> Double -> (Double, Double) -> (Seconds -> Double) -> (Int -> Double) -> [Placed] -> [(Int, (Double, Double))] -> Recording -> Interruptions
+layInterruptions left right (barHeight, gap) x y placed pauses recorded =
   Interruptions
-    { interruptionsBottom = top + rowHeight * fromIntegral rows
+    { interruptionsAbove = IntMap.map ((rowHeight *) . fromIntegral . rowCount) byLane
     , interruptionArrows = group (if isThin then "thin" else "") (concatMap arrows labelled)
     , interruptionLabels = group "il" (concatMap label labelled)
     , interruptionsBelow = [(placedLane from, below (ends from to)) | m <- markers, (from, to) <- pairsOf m]
     , interruptionEffects = nub (map effectOf markers)
     }
  where
-  markers = case together 4 found of
-    ms | length ms > 150 -> together 8 found
-    ms -> ms
-  found = sortOn fst [(x (reactionTime r), r) | r <- reactions recorded, visible r]
+  markers = map fst labelled
+  labelled = concat (IntMap.elems byLane)
+  byLane = IntMap.map inRows (IntMap.fromListWith (++) [(laneOf r, [(x (reactionTime r), r)]) | r <- reverse (sortOn reactionTime shown)])
+  inRows found@((_, r) : _) = zip ms (rowsFor left right most names ms)
+   where
+    (ms, most) = case map (\d -> together d (laneOf r) found) [0, 4, 8] of
+      apart : near : nearer : _
+        | isFew 12 apart, isFew 40 shown -> (apart, max 6 (length apart))
+        | isFew 150 near -> (near, 6)
+        | otherwise -> (nearer, 6)
+      _ -> ([], 0)
+  inRows [] = []
+  rowCount rows = 1 + maximum (map (fst . snd) rows)
+  rowY m row = y (markerLane m) - aboveBars - rowHeight * fromIntegral (maybe 0 rowCount (IntMap.lookup (markerLane m) byLane) - row) + 9
+  shown = filter visible (reactions recorded)
   visible r = isJust (reactionStopped r) || IntMap.member (reactionNumber r) started
-  labelled = zip markers (rowsFor left right names markers)
-  rows = if null markers then 0 else 1 + maximum (map (fst . snd) labelled)
-  rowY row = top + rowHeight * fromIntegral row + 9
   stopped = outermost [(n, p) | p <- placed, Just (_, StoppedBy (SignalChanged n _)) <- [nodeEnd (placedNode p)]]
   started = outermost [(n, p) | p <- placed, Just n <- [spanReaction (nodeSpan (placedNode p))]]
   names r = bimap (map (\s -> (spanName s, spanBegan s))) (fmap spanName . listToMaybe) (IntMap.findWithDefault ([], []) (reactionNumber r) involved)
@@ -89,28 +90,34 @@ layInterruptions left right top (barHeight, gap) x y placed recorded =
    where
     targets = take 12 (concatMap (targetsOf (markerX m)) (markerReactions m))
     sameLanes (a, b) (a', b') = placedLane a == placedLane a' && placedLane b == placedLane b'
-    downTo (tip, p) = downArrow gap (markerX m, rowY row + 6) (tip, y (placedLane p))
-    distinct = nubBy (\a b -> placedLane (snd a) == placedLane (snd b))
+    downTo (tip, lane, further) = downArrow gap (markerX m, rowY m row + 6) (tip, y lane + further)
+    distinct = nubBy (\(_, a, _) (_, b, _) -> a == b)
   pairsOf m = [(from, to) | r <- markerReactions m, from : _ <- [find' stopped r], to : _ <- [find' started r]]
-  -- What was stopped; else what was started; else where the operator ran. And the pixel at which the arrow ends: not
-  -- where two bars meet.
+  -- What was stopped; else what was started; else where nothing has a name in what the operator ran in; else that. The
+  -- pixel at which the arrow ends is not where two bars meet.
   targetsOf at r = case (find' stopped r, find' started r) of
     ([], []) -> case reactionParent r of
-      Inside n -> maybe [] (\p -> [(at, p)]) (IntMap.lookup n byNumber)
+      Inside n | Just p <- IntMap.lookup n byNumber ->
+        if any (isPause (placedLane p + 1) at) pauses then [(at, placedLane p + 1, barHeight / 2 - 2)] else [(at, placedLane p, 0)]
       _ -> []
-    ([], p : _) -> [(max at (afterBegin 8 p), p)]
-    (ps, _) -> [(min at (beforeEnd 8 p), p) | p <- ps]
+    ([], p : _) -> [(max at (afterBegin 8 p), placedLane p, 0)]
+    (ps, _) -> [(min at (beforeEnd 8 p), placedLane p, 0) | p <- ps]
+  isPause lane at (lane', (a, b)) = lane == lane' && at >= a - 1 && at <= b + 1
+  laneOf r = case targetsOf (x (reactionTime r)) r of
+    [] -> 0
+    targets -> minimum [lane | (_, lane, _) <- targets]
   onward from to
     | placedLane from == placedLane to = bracket (min 9 (gap - 3)) (ends from to) (y (placedLane from) + barHeight)
     | otherwise = onwardCurve (fst (ends from to), y (placedLane from) + barHeight) (placedLeft to, y (placedLane to) + barHeight / 2)
   arrow = if isThin then shape "ar" else arrowOver
-  isThin = length markers > 40
+  isThin = not (isFew 40 markers)
+  isFew n = null . drop n
   below (a, b) = (min a b - 6, max a b + 6)
   find' known r = IntMap.findWithDefault [] (reactionNumber r) known
 
   label (m, (row, known)) =
-    path (effectClass (effectOf m)) (diamond (markerX m) (rowY row)) (titled about)
-      : maybe [] (\(at, _, parts) -> [textAt "" at (rowY row + 4) parts]) known
+    path (effectClass (effectOf m)) (diamond (markerX m) (rowY m row)) (titled about)
+      : maybe [] (\(at, _, parts) -> [textAt "" at (rowY m row + 4) parts]) known
    where
     about = case markerReactions m of
       [r] -> [described r]
@@ -120,6 +127,10 @@ layInterruptions left right top (barHeight, gap) x y placed recorded =
 rowHeight :: Double
 rowHeight = 20
 
+-- | The space between the rows and the bars below them.
+aboveBars :: Double
+aboveBars = 14
+
 -- (Several changes at one place are an interruption, if one of them is.)
 effectOf :: Marker -> Effect
 effectOf m = if any (isJust . reactionStopped) (markerReactions m) then Interrupts else OnlyStarts
@@ -127,12 +138,6 @@ effectOf m = if any (isJust . reactionStopped) (markerReactions m) then Interrup
 effectClass :: Effect -> Text
 effectClass Interrupts = "i"
 effectClass OnlyStarts = "io"
-
--- How many of them interrupted something, and how many only started something.
-changesOf :: [Reaction] -> String
-changesOf rs = intercalate ", " [some n what | (n, what) <- [(interruptions, "interruption"), (length rs - interruptions, "start")], n > 0]
- where
-  interruptions = length (filter (isJust . reactionStopped) rs)
 
 -- For each reaction the spans that are in no other one of the same reaction, by lane.
 outermost :: [(Int, Placed)] -> IntMap.IntMap [Placed]
@@ -142,74 +147,6 @@ outermost found = IntMap.map (sortOn placedLane . alone) (IntMap.fromListWith (+
   within known p = case spanParent (nodeSpan (placedNode p)) of
     Inside n -> IntMap.member n known
     _ -> False
-
-together :: Double -> [(Double, Reaction)] -> [Marker]
-together _ [] = []
-together distance ((x, r) : rest) = Marker x (r : map snd near) : together distance far
- where
-  (near, far) = span ((< x + distance) . fst) rest
-
--- The rows of the markers, so that no label lies over another one, nor (if possible) over an
--- arrow. The last row
--- is for those that have no label. (Given the names of the spans that a reaction stopped, and when each
--- began; and the name of the first one that it started.)
-rowsFor :: Double -> Double -> (Reaction -> ([(String, Seconds)], Maybe String)) -> [Marker] -> [Label]
-rowsFor left right names markers = map final chosen
- where
-  -- The longest texts with which as many as possible have one.
-  chosen = chosenFrom True (snd (head (sortOn fst [(without (chosenFrom False known), known) | known <- lengths])))
-  lengths = [texts, drop 1 . texts, shortest]
-  shortest = take 1 . reverse . texts
-  without = length . filter (isNothing . snd . snd)
-  final (_, (_, Nothing)) = (1 + maximum (-1 : [row | (_, (row, Just _)) <- chosen]), Nothing)
-  final (_, l) = l
-  chosenFrom :: Bool -> (Marker -> [[Part]]) -> [(Marker, Label)]
-  chosenFrom crossing ofMarker = reverse (foldl choose [] markers)
-   where
-    choose done m = (m, fromMaybe (-1, Nothing) (listToMaybe (mapMaybe (fits False done m) options ++ mapMaybe (fits True done m) (if crossing then crossed else [])))) : done
-     where
-      options = [(row, l) | l <- candidates (ofMarker m) m, row <- [0 .. 5]]
-      crossed = [(row, l) | l <- candidates (shortest m) m, row <- [0 .. 5]]
-  -- Better an arrow behind a label than no label.
-  fits crossed done m (row, l@(at, w, _))
-    | any conflict (take 200 done) = Nothing
-    | otherwise = Just (row, Just l)
-   where
-    conflict (_, (_, Nothing)) = False
-    conflict (other, (row', Just (at', w', _)))
-      | row == row' = at - 14 < at' + w' + 14 && at' - 14 < at + w + 14
-      | crossed = False
-      | row < row' = covers at' w' (markerX m)
-      | otherwise = covers at w (markerX other)
-  covers at w x = x > at - 8 && x < at + w + 8
-  candidates known m =
-    concat [[beside m parts | fitsRight m parts] ++ [before m parts | fitsLeft m parts] | parts <- known] ++ cut known m
-  fitsRight m parts = markerX m + 12 + wide parts <= right
-  fitsLeft m parts = markerX m - 12 - wide parts >= left
-  beside m parts = (markerX m + 12, wide parts, parts)
-  before m parts = (markerX m - 12 - wide parts, wide parts, parts)
-  wide = partsWidth
-  cut ((part : _) : _) m
-    | room <- right - markerX m - 24, room > 90 = [(markerX m + 12, room, [("k", fitted (room / 1.12) (snd part))])]
-  cut _ _ = []
-  texts m = case markerReactions m of
-    [r] -> [[("k", changed), ("q", what)] | (changed, what) <- variants r, not (null what)] ++ [[("k", values r)]]
-    several
-      | null (drop 40 markers) -> [[("k", changesOf several)]]
-      | otherwise -> []
-  variants r =
-    [ (values r, inertUpTo 160 (long r))
-    , (values r, inertUpTo 80 (arrows (short r)))
-    , (briefly r, inertUpTo 80 (arrows (short r)))
-    , (briefly r, inertUpTo 80 (arrows (take 1 (short r))))
-    ]
-  values r = inertUpTo 120 (intercalate " → " (fst (partsOf r)))
-  -- Without the values before.
-  briefly r = values r {reactionChanges = [c {changeBefore = Nothing} | c <- reactionChanges r]}
-  partsOf r = uncurry reactionParts (names r) r
-  long r = arrows (snd (partsOf r))
-  short r = [stoppedText (map fst (fst (names r))) b | Just b <- [reactionStopped r]] ++ startsText (snd (names r)) r
-  arrows = unwords . map ("→ " ++)
 
 diamond :: Double -> Double -> Text
 diamond x y = Text.concat ["M", px (x - 6), " ", px y, "l6 -6 6 6-6 6Z"]

@@ -7,8 +7,8 @@ module Behavior.Trace.Svg.Labels
   , labels
   ) where
 
-import Data.List (minimumBy)
-import Data.Maybe (fromMaybe, listToMaybe)
+import Data.List (intercalate, minimumBy)
+import Data.Maybe (listToMaybe)
 import Data.Ord (comparing)
 import qualified Data.Text as Text
 import Graphics.Svg.Core (Element)
@@ -18,12 +18,15 @@ import Behavior.Trace.Describe
 import Behavior.Trace.Recording (Node (..))
 import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Layout
+import Behavior.Trace.Svg.Outcome
 
--- | A text of a bar: in which lane, how many of its lines are below the bar, and what to draw, given the
--- upper edge of the bar.
+-- | A text of a bar: in which lane, how many of its lines are below the bar, between which pixels, and what to draw, given
+-- the upper edge of the bar.
 data Label = Label
   { labelLane :: !Int
   , labelLinesBelow :: !Int
+  , labelFrom :: !Double
+  , labelTo :: !Double
   , labelDrawn :: Double -> [Element]
   }
 
@@ -38,25 +41,32 @@ labels notes right h taken = go (-1) 0 0
   -- The last text in this lane ends at `used`, the last one below its bars at `noted`.
   go lane used noted (m : later)
     | markLane m /= lane = go (markLane m) 0 0 (m : later)
-    | otherwise = map (Label lane 0) found ++ note ++ go lane used' noted' later
+    | otherwise = [Label lane 0 a b drawn | (a, b, drawn) <- found] ++ note ++ go lane used' noted' later
    where
     sameLane = takeWhile ((== lane) . markLane) later
     (found, used', complete) = name right h used m (maybe right markLeft (listToMaybe sameLane))
     (note, noted')
-      | notes, not complete, isNoted m = below noted m sameLane (null found)
+      | notes, not complete, isNoted m || (null found && isAlone m) = below noted m sameLane (null found)
       | otherwise = ([], noted)
 
   -- From the bar on to the right; or if there is no room, with its name, ending there.
-  below noted m later unnamed = case (notedLines (room left) (text unnamed), notedLines (room furthest) (text True)) of
+  below noted m later unnamed
+    | isNoted m || all (isAt m) placed = (placed, noted')
+    | otherwise = ([], noted)
+   where
+    (placed, noted') = belowAt noted m later unnamed
+    -- A name that is not at its bar could be of another one.
+    isAt bar l = labelFrom l < markRight bar && labelTo l > markLeft bar
+  belowAt noted m later unnamed = case (notedLines (room left) (text unnamed), notedLines (room furthest) (text True)) of
     ([], []) -> ([], noted)
     ([], texts) -> noteAt (end - width texts) texts
     (texts, _) -> noteAt left texts
    where
     noteAt x texts =
-      ( [Label (markLane m) (length texts) (\top -> [textAt classes x (top + h + dy) [("", t)] | (dy, t) <- zip [12, 25] texts])]
+      ( [Label (markLane m) (length texts) x (x + width texts) (\top -> [textAt classes x (top + h + dy) [("", t)] | (dy, t) <- zip [12, 25] texts])]
       , x + width texts + 8
       )
-    classes = "n n" <> outcomeClass (markOutcome m)
+    classes = if isNoted m then "n n" <> outcomeClass (markOutcome m) else "n"
     width texts = maximum (map textWidth texts) * 11 / 12
     left = foldl past (max (markLeft m) noted) there
     past at (l, r) = if at > l && at < r then r else at
@@ -64,25 +74,26 @@ labels notes right h taken = go (-1) 0 0
     end = minimum (right - 4 : [l | (l, _) <- there, l >= left] ++ [markLeft o - 6 | o <- later, isNoted o, not (fitsWhole o)])
     there = [interval | (lane, interval) <- taken, lane == markLane m]
     room from = (end - from) * 12 / 11
-    text isNamed = inertUpTo 120 ((if isNamed then nameOf m ++ ": " else "") ++ fromMaybe "" (whyOf m))
+    text isNamed = inertUpTo 120 (intercalate ": " ([nameOf m | isNamed] ++ [why | Just why <- [whyOf m]]))
 
 -- What to draw, given the upper edge of the bar; where it ends; and whether it contains all there is to say.
 -- The last text in this lane ends at `used`, the next bar begins at `next`.
-name :: Double -> Double -> Double -> Mark -> Double -> ([Double -> [Element]], Double, Bool)
+name :: Double -> Double -> Double -> Mark -> Double -> ([(Double, Double, Double -> [Element])], Double, Bool)
 name right h used m next
   | fitsWhole m = inBar full True
   | isMerged m && inside < 60 = nothingFits
   | single, isExplained, after >= partsWidth full = behind full True
   | inside >= partsWidth short = inBar short False
   | Just (lines', False) <- stacked = onTwo lines'
+  | inside >= smallWidth - 6 = small (nameOf m)
   | single, after >= partsWidth full = behind full True
   | single, after >= partsWidth short = behind short False
   | single, next >= right, markLeft m - used - 22 >= partsWidth short = before
   | Just (lines', _) <- stacked = onTwo lines'
-  | inside >= 24 = inBar [("k", fitted (inside / 1.12) (nameOf m))] False
+  | isReadable cut = small cut
   | otherwise = nothingFits
  where
-  single = not (isMerged m) && (w >= 3 || markOutcome m == Running)
+  single = isAlone m
   w = markRight m - markLeft m
   inside = insideOf m
   after = next - markRight m - 22
@@ -102,14 +113,23 @@ name right h used m next
    where
     left = markLeft m - 14 - partsWidth short
   at left parts more whole =
-    ([\top -> textAt (groundAt left) left (top + h / 2 + 4) parts : map ($ top) more], max (markRight m) (left + partsWidth parts), whole)
-  onTwo (one, two) =
-    ( [\top -> [textAt (groundAt left <> " z") left (top + h / 2 + dy) [("", t)] | (dy, t) <- [(-1.5, one), (9, two)]]]
+    ( [(left, left + partsWidth parts, \top -> textAt (groundAt left) left (top + h / 2 + 4) parts : map ($ top) more)]
+    , max (markRight m) (left + partsWidth parts)
+    , whole
+    )
+  onTwo (one, two) = inSmall [(-1.5, one), (9, two)]
+  small one = inSmall [(3.5, one)]
+  inSmall texts =
+    ( [(left, markRight m, \top -> [textAt (groundAt left <> " z") left (top + h / 2 + dy) [("", t)] | (dy, t) <- texts])]
     , markRight m
     , False
     )
    where
     left = markLeft m + 5
+  smallWidth = textWidth (nameOf m) * 10 / 12
+  cut = fitted ((inside + 6) * 1.2) (nameOf m)
+  -- Fewer letters could be of any name.
+  isReadable = (> 6) . length
   nothingFits = ([], max used (markRight m), False)
   leader from to top = shape "ld" (Text.concat ["M", px from, " ", px (top + h / 2), "H", px to])
   notch = case markOutcome m of
@@ -122,6 +142,10 @@ name right h used m next
 
 fitsWhole :: Mark -> Bool
 fitsWhole m = insideOf m >= partsWidth (fullOf m)
+
+-- It is a span that is no mere line.
+isAlone :: Mark -> Bool
+isAlone m = not (isMerged m) && (markRight m - markLeft m >= 3 || markOutcome m == Running)
 
 insideOf :: Mark -> Double
 insideOf m = markRight m - markLeft m - 16
@@ -164,7 +188,7 @@ detailOf :: Mark -> Maybe String
 detailOf m
   | isMerged m = Nothing
   | otherwise = case nodeEnd (markNode m) of
-      Just (t, Succeeded) -> Just (took t)
+      Just (t, Succeeded) -> Just (took t ++ (if markOutcome m == RanAgain then ", ran again" else ""))
       Just (t, StoppedBy (SignalChanged _ _)) -> Just ("stopped after " ++ took t)
       Just (_, how@(StoppedBy _)) -> Just (inertUpTo 200 (howText how))
       Just _ -> whyOf m

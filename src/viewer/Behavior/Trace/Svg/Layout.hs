@@ -9,8 +9,6 @@ module Behavior.Trace.Svg.Layout
 
     -- * Marks
   , Mark (..)
-  , Outcome (..)
-  , outcomeOf
   , marks
   , isMerged
   ) where
@@ -22,6 +20,7 @@ import qualified Data.Map.Strict as Map
 
 import Behavior.Trace
 import Behavior.Trace.Recording (Node (..))
+import Behavior.Trace.Svg.Outcome
 
 -- | A span with its lane and the pixels between which it is drawn.
 data Placed = Placed
@@ -85,19 +84,6 @@ firstFree ends height left = from
         l -> from (last l + 1)
   occupied lane = maybe False (> left) (IntMap.lookup lane ends)
 
--- | How a span ended.
-data Outcome = Success | Stop | Running | Failure | Fault
-  deriving (Eq, Ord, Show, Enum, Bounded)
-
--- | How it ended.
-outcomeOf :: Node -> Outcome
-outcomeOf n = case nodeEnd n of
-  Nothing -> Running
-  Just (_, Succeeded) -> Success
-  Just (_, FailedWith _) -> Failure
-  Just (_, FaultedWith _) -> Fault
-  Just (_, StoppedBy _) -> Stop
-
 -- | A span, or several with the same outcome that are drawn as one.
 data Mark = Mark
   { markLane :: !Int
@@ -119,16 +105,16 @@ isMerged m = markCount m > 1
 -- merged with their neighbours of the same outcome; if there would be more marks than the given number, those of two
 -- pixels, of four, and so on. Marks of what failed, faulted, or was stopped are never part of a
 -- mark of another outcome.
-marks :: Int -> [Placed] -> [Mark]
-marks budget placed = case filter few attempts of
+marks :: (Node -> Outcome) -> Int -> [Placed] -> [Mark]
+marks outcomeOf budget placed = case filter few attempts of
   enough : _ -> enough
   [] -> last attempts
  where
-  attempts = map (`mergedBelow` placed) (takeWhile (<= 256) (iterate (* 2) 1))
+  attempts = map (\w -> mergedBelow outcomeOf w placed) (takeWhile (<= 256) (iterate (* 2) 1))
   few = null . drop budget
 
-mergedBelow :: Double -> [Placed] -> [Mark]
-mergedBelow width placed = sortOn position (map single wide ++ concatMap merge (Map.toList narrow))
+mergedBelow :: (Node -> Outcome) -> Double -> [Placed] -> [Mark]
+mergedBelow outcomeOf width placed = sortOn position (map single wide ++ concatMap merge (Map.toList narrow))
  where
   position m = (markLane m, markLeft m)
   isWide p = not (placedBelow p) && placedRight p - placedLeft p >= width

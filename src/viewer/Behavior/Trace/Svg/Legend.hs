@@ -12,7 +12,7 @@ import Graphics.Svg.Core (Element)
 
 import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Interruptions
-import Behavior.Trace.Svg.Layout
+import Behavior.Trace.Svg.Outcome
 
 -- | What a timeline contains.
 data Used = Used
@@ -20,27 +20,36 @@ data Used = Used
   , usedStopping :: !Bool
   -- ^ A part of a bar shows that it was being stopped.
   , usedChanges :: [Effect]
+  , usedPauses :: !Bool
   , usedMerged :: !Bool
   -- ^ Marks for several spans.
   }
 
--- | What the marks mean that the timeline contains, from that pixel on.
-legend :: Double -> Used -> Element
-legend margin used = group "le" (fst (foldl entry ([], margin) entries))
+-- | What the marks mean that the timeline contains, between those pixels; and how much room the lines take after the
+-- first.
+legend :: Double -> Double -> Used -> (Element, Double)
+legend left right used = (group "le" (concat drawn), maximum (0 : downs))
  where
-  entry (done, left) (draw, word) =
-    (done ++ [draw left, textAt "q" (left + 32) 84 [("", word)]], left + 32 + textWidth word + 16)
+  (drawn, downs) = unzip [([draw x (73 + down), textAt "q" (x + 32) (84 + down) [("", word)]], down) | ((draw, word), (x, down)) <- zip entries (scanl after (left, 0) (zip entries (drop 1 entries)))]
+  -- Where the next one is.
+  after (x, down) (entry, next)
+    | x' + wide next <= right = (x', down)
+    | otherwise = (left, down + 20)
+   where
+    x' = x + wide entry + 16
+  wide (_, word) = 32 + textWidth word
   entries =
     concatMap
       (map snd . filter fst)
-      [ map outcome [(Success, "succeeded"), (Failure, "failed"), (Fault, "faulted"), (Stop, "stopped")]
-      , [(usedStopping used, (\left -> shape "h" (barShape Stop left 73 26 13), "while stopping"))]
+      [ map outcome [(Success, "succeeded"), (RanAgain, "succeeded, but ran again"), (Failure, "failed"), (Fault, "faulted"), (Stop, "stopped")]
+      , [(usedStopping used, (\x y -> shape "h" (barShape Stop x y 26 13), "while stopping"))]
       , [outcome (Running, "not ended")]
-      , [(e `elem` usedChanges used, (\left -> arrowSample e left 79.5, word)) | (e, word) <- changes]
+      , [(usedPauses used, (\x y -> shape "wt" (Text.concat ["M", px (x + 2), " ", px (y + 6.5), "H", px (x + 25)]), "waiting, or unnamed"))]
+      , [(e `elem` usedChanges used, (\x y -> arrowSample e x (y + 6.5), word)) | (e, word) <- changes]
       , [(usedMerged used, (several, "short spans, together"))]
       ]
   changes = [(Interrupts, "a signal changed → stopped → started"), (OnlyStarts, "a signal changed → started")]
   outcome (o, word) =
-    (o `elem` usedOutcomes used, (\left -> path (Text.unwords ["b", outcomeClass o]) (barShape o left 73 26 13) mempty, word))
-  several left =
-    group "" (shape "m v2 s" (markShape Success left 73 26 13) : [shape "m f" (markShape Failure (left + 8) 73 2 13) | Failure `elem` usedOutcomes used])
+    (o `elem` usedOutcomes used, (\x y -> path (Text.unwords ["b", outcomeClass o]) (barShape o x y 26 13) mempty, word))
+  several x y =
+    group "" (shape "m v2 s" (markShape Success x y 26 13) : [shape "m f" (markShape Failure (x + 8) y 2 13) | Failure `elem` usedOutcomes used])
