@@ -66,7 +66,7 @@ times n = show n ++ " times"
 inSeries :: [Taken] -> [Taken]
 inSeries taken
   | null (drop 4 taken) = taken
-  | otherwise = mostFirst (map one (Map.toList (Map.fromListWith (flip (++)) [(numbered name, [t]) | t@(Taken name _ _) <- taken])))
+  | otherwise = mostFirst (map one (Map.toList (Map.fromListWith (++) [(numbered name, [t]) | t@(Taken name _ _) <- reverse taken])))
  where
   one (_, [single]) = single
   one ((name, _), several) = Taken (name ++ range [n | Taken n _ _ <- several]) (sum [t | Taken _ t _ <- several]) (concat [same | Taken _ _ same <- several])
