@@ -69,6 +69,7 @@ rover = do
   it "stops its motor on the way home, under every schedule with two pre-emptions" $ do
     tried <- wayHome goHome (exhaustively 2)
     tried `shouldSatisfy` reportComplete
+    reportStarted tried `shouldContain` ["drive home"]
 
   it "stops its motor in reality" $
     trial (\it' -> untilButton it' (goHome it')) [(0, True)] id

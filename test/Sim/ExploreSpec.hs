@@ -183,7 +183,6 @@ counterexample = do
 
 properties :: Spec
 properties = do
-  it "need not simulate" $ reportSchedules <$> explore (randomly 3) (const (pure ())) `shouldReturn` 3
   it "simulates only once" $ do
     found <- tryExplore (randomly 3) $ \run -> run (pure ()) >> void (run (pure ()))
     either (show . failingException) show found `shouldBe` "explore: a property simulates only once"

@@ -3,19 +3,26 @@
 module Sim.VacuousSpec (spec) where
 
 import Control.Exception (ErrorCall (..))
-import Control.Monad (void)
+import Control.Monad (void, when)
 import Data.Foldable (for_)
+import Data.IORef (modifyIORef, newIORef, readIORef)
 import Data.List (isInfixOf)
-import Test.Hspec
+import Test.Hspec hiding (parallel)
+import Test.QuickCheck (Args (chatty), Result (output), quickCheckWithResult, stdArgs, (==>))
 
 import Behavior
+import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
+import Behavior.Sim.QuickCheck (underSchedules)
+import Behavior.Trace (named)
 import Support (guarded)
 
 spec :: Spec
 spec = guarded $ do
   describe "A world that a run does not own" worlds
+  describe "An exploration that shows nothing" explorations
+  describe "The report of an exploration" coverage
 
 worlds :: Spec
 worlds = do
@@ -59,6 +66,66 @@ worlds = do
     , ("a reading", \_ low -> void (reading low))
     , ("a change", \_ low -> set low True)
     ]
+
+explorations :: Spec
+explorations = do
+  for_ plans $ \(name, plan, why) ->
+    it ("is refused: " ++ name) $
+      explore plan (\simulated -> void (simulated (sleep 1))) `shouldThrow` (== ErrorCall ("explore: " ++ why))
+  for_ [randomly 3, exhaustively 1, replaying NonPreemptive, (randomly 1) {planSearch = Shrink NonPreemptive}] $ \plan ->
+    it ("is refused, when its property simulates nothing: " ++ show (planSearch plan)) $
+      explore plan (\_ -> pure ()) `shouldThrow` saying "the property has simulated nothing"
+  it "is refused, when its property simulates nothing under one of the schedules" $ do
+    runs <- newIORef (0 :: Int)
+    let thrice simulated = modifyIORef runs (+ 1) >> readIORef runs >>= \n -> when (n < 3) (void (simulated (sleep 1)))
+    explore (randomly 3) thrice `shouldThrow` saying "the property has simulated nothing"
+  it "is a counterexample, when its property fails before it simulates" $ do
+    found <- tryExplore (randomly 3) (\_ -> fail "no world")
+    either (show . failingException) show found `shouldBe` "user error (no world)"
+  it "is a failed test of QuickCheck, unless the test is discarded" $ do
+    result <- quickCheckWithResult stdArgs {chatty = False} (underSchedules (\_ -> pure True))
+    output result `shouldContain` "the property has simulated nothing"
+    gaveUp <- quickCheckWithResult stdArgs {chatty = False} (underSchedules (\_ -> pure (False ==> True)))
+    output gaveUp `shouldContain` "Gave up!"
+ where
+  plans =
+    [ ("randomly (-3)", randomly (-3), "a random plan has at least 1 schedule, and not -3")
+    , ("randomly 0", randomly 0, "a random plan has at least 1 schedule, and not 0")
+    , ("exhaustively (-1)", exhaustively (-1), "an exhaustive plan has at least 0 pre-emptions, and not -1")
+    , ("Exhaustive 1 0", (randomly 1) {planSearch = Exhaustive 1 0}, "an exhaustive plan has at least 1 schedule, and not 0")
+    ]
+
+coverage :: Spec
+coverage = do
+  it "names the scripted actions that no schedule has started" $ do
+    report <- exploring (\drive _ _ -> drive)
+    reportNeverStarted report `shouldBe` ["charge", "honk"]
+    show report `shouldContain` "; none of them started \"charge\", \"honk\""
+  it "names none, when each has been started under some schedule, with any argument" $ do
+    report <- exploring (\drive honk charge -> (drive ||| honk) >> charge 'x')
+    reportNeverStarted report `shouldBe` []
+    show report `shouldNotContain` "none"
+  it "knows an action that only some schedules start" $ do
+    -- The right branch honks, unless it is stopped before.
+    report <- exploring (\_ honk _ -> parallel (pure ()) honk)
+    reportNeverStarted report `shouldBe` ["charge", "drive"]
+  it "knows an action that was made in the run" $ do
+    report <- explore (randomly 3) $ \simulated -> void . simulated $ do
+      world <- newMock
+      begin world
+      void (action world "late" [succeeds])
+    reportNeverStarted report `shouldBe` ["late"]
+  it "has the names of what was started: behaviours, actions, branches, rules" $ do
+    report <- exploring $ \drive honk _ ->
+      named "mission" (Signal.teleoReactive [(pure False, honk), (pure True, drive)] ||| sleep 4)
+    reportStarted report
+      `shouldBe` ["drive", "mission", "parallel: left", "parallel: right", "teleoReactive: rule 2"]
+ where
+  exploring mission = explore (randomly 20) $ \simulated -> do
+    (world, drive, _) <- rover
+    honk <- action world "honk" [succeeds]
+    charge <- actionOn world "charge" (\place -> [succeeds | place == 'x'])
+    void (simulated (begin world >> mission drive honk charge))
 
 -- | A world, an action that takes four seconds, and a condition.
 rover :: IO (Mock, Behavior (), Condition Bool)

@@ -50,6 +50,7 @@ module Behavior.Internal.Runtime
   , annotate
   , reportUncaught
   , isRecorded
+  , announce
   , simulatedRun
   ) where
 
@@ -385,6 +386,10 @@ reportUncaught e =
 -- run its remaining threads are unwound; that does not belong to the record.
 isRecorded :: IO Bool
 isRecorded = inSimulation (pure True) recording
+
+-- | Passes the names of scripted actions to the simulation, which can start them.
+announce :: [String] -> IO ()
+announce actions = inSimulation (pure ()) (`recordScripted` actions)
 
 -- | The simulation that the calling thread is part of: its number, and how to read its clock, later too.
 simulatedRun :: IO (Maybe (Int, IO Seconds))

@@ -56,7 +56,7 @@ import Behavior.Internal.Trace.Span (actionSpan)
 action :: Mock -> String -> [Script a] -> IO (Behavior a)
 action mock name scripts = do
   checkScripts ("action " ++ show name) scripts
-  registerName mock "action" name
+  registerAction mock name
   calls <- newIORef Map.empty
   pure (actionSpan name (play mock (nextCall mock calls name "" scripts)))
 
@@ -72,7 +72,7 @@ action mock name scripts = do
 -- @since 0.1.0.0
 actionOn :: Show x => Mock -> String -> (x -> [Script a]) -> IO (x -> Behavior a)
 actionOn mock name scripts = do
-  registerName mock "action" name
+  registerAction mock name
   calls <- newIORef Map.empty
   pure $ \x -> do
     -- The scripts of an argument can be checked only when the argument is known.

@@ -18,6 +18,7 @@ module Behavior.Internal.Mock.World
   , clock
   , recordEntry
   , registerName
+  , registerAction
   , registerPending
   , checkTimes
 
@@ -53,6 +54,8 @@ data Mock = Mock
   , misuse :: IORef (Maybe ErrorCall)
   -- ^ The error of a use in another run than its own: that run may have lost it.
   , names :: IORef [String]
+  , actions :: IORef [String]
+  -- ^ Those of the names that are an action's.
   , newestEntries :: IORef [RecordEntry]
   -- ^ Newest first.
   , pendingChanges :: IORef [Seconds -> STM [RecordEntry]]
@@ -72,7 +75,7 @@ data Beginning = Beginning
 --
 -- @since 0.1.0.0
 newMock :: IO Mock
-newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
+newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef [] <*> newIORef []
 
 -- | Starts the clock of the world, if it is not running yet. Without this it starts when the first
 -- action begins, or when a condition is read, watched or set for the first time.
@@ -102,7 +105,8 @@ clock mock = do
   t <- now
   here <- simulatedRun
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
-  own <- atomicModifyIORef' (beginning mock) $ \begun -> let it = fromMaybe first begun in (Just it, it)
+  (own, isFirst) <- atomicModifyIORef' (beginning mock) $ \begun -> let it = fromMaybe first begun in (Just it, (it, isNothing begun))
+  when isFirst (readIORef (actions mock) >>= announce)
   unless (ownRun own == ownRun first) $ do
     writeIORef (misuse mock) (Just (belongsTo own first))
     throwIO (belongsTo own first)
@@ -144,6 +148,13 @@ registerName mock kind name = do
     if name `elem` old then (old, True) else (name : old, False)
   when taken . throwIO . ErrorCall $
     kind ++ " " ++ show name ++ ": something else in this world has this name already"
+
+-- | Registers an action, which belongs to the coverage of the runs.
+registerAction :: Mock -> String -> IO ()
+registerAction mock name = do
+  registerName mock "action" name
+  atomicModifyIORef' (actions mock) (\old -> (name : old, ()))
+  announce [name]
 
 -- | Registers how to find the changes of a condition that are due by a given time but not
 -- recorded yet.

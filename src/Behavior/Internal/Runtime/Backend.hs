@@ -56,4 +56,6 @@ data Simulator = Simulator
   -- ^ Adds to the record that the calling thread starts.
   , recordNote :: String -> IO ()
   -- ^ Adds a text to the record.
+  , recordScripted :: [String] -> IO ()
+  -- ^ Adds the names of scripted actions that the run can start.
   }

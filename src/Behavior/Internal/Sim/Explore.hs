@@ -18,6 +18,7 @@ import Data.Maybe (fromMaybe)
 import qualified Data.Sequence as Seq
 
 import Behavior.Internal.Failure (Behavior, isCancellation)
+import Behavior.Internal.Sim.Coverage
 import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Prefix
@@ -49,7 +50,18 @@ data Trial = Trial
   , happened :: [Step]
   , traceOfRun :: [Event]
   , size :: Int
+  , actions :: [String]
+  -- ^ The scripted actions that it could start.
   }
+
+-- | The runs so far: how many, their scheduling points in all, and what they have started.
+data Tally = Tally !Int !Int !Coverage
+
+counting :: Tally -> Trial -> Tally
+counting (Tally n total covered) t = Tally (n + 1) (total + size t) (withRun (traceOfRun t) (actions t) covered)
+
+reported :: Bool -> Tally -> Report
+reported all' (Tally n total covered) = Report n all' total (started covered) (neverStarted covered)
 
 -- | Runs a property under many schedules, until one fails.
 --
@@ -62,6 +74,8 @@ data Trial = Trial
 --   pre-emptions. 'replaying' runs it again.
 -- [Fault] If a run is not a valid simulation ('BlockedOutside', 'ExternalWakeup', 'TooSlow',
 --   'ScheduleMismatch'), an 'ErrorCall' with the text of 'explain' is thrown to the property.
+--   What would test nothing throws an 'ErrorCall' to the caller: a plan without a schedule, and a
+--   property that returns without a simulation.
 --
 -- >>> :{
 -- report <- explore (exhaustively 1) $ \simulate -> do
@@ -69,8 +83,11 @@ data Trial = Trial
 --   if finished run == 1 then pure () else fail "the first to finish does not end it"
 -- :}
 --
--- >>> reportComplete report
--- True
+-- >>> (reportComplete report, reportStarted report)
+-- (True,["parallel: left","parallel: right"])
+--
+-- >>> explore (randomly 100) (\_ -> pure ())
+-- *** Exception: explore: the property has simulated nothing, so it shows nothing: it is given a function, and has to simulate with it
 --
 -- @since 0.1.0.0
 explore :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Report
@@ -89,44 +106,51 @@ explore plan property =
 tryExplore
   :: Plan -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO (Either Counterexample Report)
 tryExplore plan property = case planSearch plan of
-  Random n seed -> randomSearch n seed
-  Exhaustive k limit -> fullSearch k limit
+  Random n seed
+    | n < 1 -> refused "a random plan has at least 1 schedule" n
+    | otherwise -> randomSearch n seed
+  Exhaustive k limit
+    | k < 0 -> refused "an exhaustive plan has at least 0 pre-emptions" k
+    | limit < 1 -> refused "an exhaustive plan has at least 1 schedule" limit
+    | otherwise -> fullSearch k limit
   Replay s -> only s $ \e t ->
     pure Counterexample {failingSchedule = s, failingException = e, failingSteps = happened t, failingEvents = traceOfRun t, schedulesTried = 1, foundBy = plan}
   Shrink s -> only s (reduced 1)
  where
   o = planOptions plan
   try' chooser' = tryRun o chooser' property
+  refused why n = throwIO (ErrorCall ("explore: " ++ why ++ ", and not " ++ show n))
+  none = Tally 0 0 nothing
 
   only s onFailure = do
     t <- try' (policy s)
     case thrown t of
-      Nothing -> pure (Right (Report 1 True (size t)))
+      Nothing -> pure (Right (reported True (counting none t)))
       Just e -> Left <$> onFailure e t
 
-  randomSearch n seed = go 1 0
+  randomSearch n seed = go 1 none
    where
-    go i !total
-      | i > n = pure (Right (Report n True total))
+    go i !before
+      | i > n = pure (Right (reported True before))
       | otherwise = do
           t <- try' (policy (Seeded (seed * 1000003 + i)))
           case thrown t of
-            Nothing -> go (i + 1) (total + size t)
+            Nothing -> go (i + 1) (counting before t)
             Just e -> Left <$> reduced i e t
 
   -- The queue is a stack. It holds the alternatives to the decisions of the last schedule,
   -- and to those of the prefixes that this schedule continues.
-  fullSearch k limit = go 1 0 (emptyPrefix k) []
+  fullSearch k limit = go 1 none (emptyPrefix k) []
    where
-    go :: Int -> Int -> Prefix -> [Alternatives] -> IO (Either Counterexample Report)
-    go n !total prefix others
-      | n > limit = pure (Right (Report (n - 1) False total))
+    go :: Int -> Tally -> Prefix -> [Alternatives] -> IO (Either Counterexample Report)
+    go n !before prefix others
+      | n > limit = pure (Right (reported False before))
       | otherwise = do
           (t, queue) <- branching prefix others
           case (thrown t, nextPrefix queue) of
             (Just e, _) -> Left <$> reduced n e t
-            (Nothing, Just (next, rest)) -> go (n + 1) (total + size t) next rest
-            (Nothing, Nothing) -> pure (Right (Report n True (total + size t)))
+            (Nothing, Just (next, rest)) -> go (n + 1) (counting before t) next rest
+            (Nothing, Nothing) -> pure (Right (reported True (counting before t)))
 
   -- Runs the non-preemptive schedule except for the choices of the prefix, and puts the
   -- alternatives to the decisions after them in front of the queue.
@@ -194,7 +218,7 @@ tryRun o choosing property = do
             let deviating = case runSchedule run of
                   Preempting s -> s
                   _ -> []
-            writeIORef made (Just (\thrown' -> Trial thrown' deviating (steps run) (events run) (runPoints run)))
+            writeIORef made (Just (\thrown' -> Trial thrown' deviating (steps run) (events run) (runPoints run) (runScripted run)))
             case outcome run of
               BlockedOutside _ _ -> improper run
               ExternalWakeup _ -> improper run
@@ -203,9 +227,11 @@ tryRun o choosing property = do
               _ -> pure run
       improper run = throwIO (ErrorCall (explain (outcome run)))
   end <- try (property simulating)
-  trial <- fromMaybe (\thrown' -> Trial thrown' [] [] [] 0) <$> readIORef made
-  case end of
-    Right () -> pure (trial Nothing)
-    Left e
+  trial <- readIORef made
+  case (end, trial) of
+    (Right (), Just simulated) -> pure (simulated Nothing)
+    (Right (), Nothing) -> throwIO . ErrorCall $
+      "explore: the property has simulated nothing, so it shows nothing: it is given a function, and has to simulate with it"
+    (Left e, _)
       | isCancellation e -> throwIO e
-      | otherwise -> pure (trial (Just e))
+      | otherwise -> pure (fromMaybe (\thrown' -> Trial thrown' [] [] [] 0 []) trial (Just e))

@@ -102,7 +102,7 @@ replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 endingAt :: Plan -> Seconds -> Plan
 endingAt whole end = whole {planOptions = (planOptions whole) {endAt = end}}
 
--- | How many schedules were explored.
+-- | What was explored. Its text has the numbers, and the scripted actions that no schedule has started.
 --
 -- @since 0.1.0.0
 data Report = Report
@@ -112,6 +112,12 @@ data Report = Report
   -- ^ Whether those were all schedules of the plan.
   , reportPoints :: !Int
   -- ^ How many scheduling points they had, in all.
+  , reportStarted :: [String]
+  -- ^ The names of what was started under at least one schedule: behaviours that have a name
+  -- ('Behavior.Trace.named'), scripted actions, and branches, as in @"monitor: recovery"@ or
+  -- @"teleoReactive: rule 2"@. Require those without which the property shows nothing.
+  , reportNeverStarted :: [String]
+  -- ^ The names of the scripted actions of mock worlds that no schedule has started.
   }
   deriving (Eq)
 
@@ -119,6 +125,7 @@ instance Show Report where
   show r =
     show (reportSchedules r) ++ " schedules of " ++ show (reportPoints r) ++ " points in all"
       ++ (if reportComplete r then "" else ", and there are more")
+      ++ (if null (reportNeverStarted r) then "" else "; none of them started " ++ intercalate ", " (map show (reportNeverStarted r)))
 
 -- | A schedule under which the property does not hold.
 --

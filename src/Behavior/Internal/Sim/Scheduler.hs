@@ -65,6 +65,7 @@ simulation n sim =
     , lookAtClock = readIORef (time sim)
     , recordStart = settle sim >> recordStep sim Starts
     , recordNote = \text -> settle sim >> recordStep sim (Note text)
+    , recordScripted = \names -> modifyIORef' (scripted sim) (names ++)
     }
  where
   -- An exception for a thread that has ended is dropped.

@@ -104,6 +104,7 @@ simulateBy o chooser' act = do
     made <- reverse <$> readIORef (history sim)
     happened <- map (runIdentity . traverseTexts (Identity . safeShow)) . reverse <$> readIORef (emitted sim)
     count <- readIORef (counter sim)
+    actions <- readIORef (scripted sim)
     uninterruptibleMask_ (unwind sim verdict)
     end <- readIORef result
     deviating <- reverse <$> readIORef (deviations sim)
@@ -120,6 +121,7 @@ simulateBy o chooser' act = do
             , runSchedule = Preempting deviating
             , runPoints = count
             , leakedThreads = left
+            , runScripted = actions
             }
 
 simulationNumber :: IORef Int

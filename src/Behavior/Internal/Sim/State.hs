@@ -84,6 +84,8 @@ data Sim = Sim
   -- ^ The steps, the latest first.
   , emitted :: !(IORef [Event])
   -- ^ The events of its trace, the latest first.
+  , scripted :: !(IORef [String])
+  -- ^ The names of the scripted actions of its mock worlds.
   , runEnd :: !(MVar (Maybe (Outcome Void)))
   -- ^ How the run ended; 'Nothing': as the behaviour did. The task that puts it no longer has
   -- the turn.
@@ -178,6 +180,7 @@ newSim o p = do
     <*> newIORef turnLimit
     <*> newIORef 0
     <*> newIORef 0
+    <*> newIORef []
     <*> newIORef []
     <*> newIORef []
     <*> newIORef []

@@ -30,7 +30,7 @@ import Control.Exception (Exception (..), SomeAsyncException, throwIO)
 import Control.Monad (when)
 import Data.Foldable (for_)
 import Data.IORef
-import Data.Maybe (isJust)
+import Data.Maybe (isJust, isNothing)
 import Test.QuickCheck hiding (Property, Result, theException)
 import Test.QuickCheck.Gen.Unsafe (Capture (..), capture)
 import Test.QuickCheck.Property
@@ -58,7 +58,8 @@ import qualified Behavior.Sim as Sim
 
 -- | Runs a property under a schedule that QuickCheck draws, a new one for each test.
 --
--- The property is given a function that simulates under that schedule, once. It returns
+-- The property is given a function that simulates under that schedule, once (a test that has simulated
+-- nothing fails, unless it is discarded). It returns
 -- anything that QuickCheck can test, and QuickCheck decides as usual: a discarded test is
 -- discarded, 'expectFailure' expects a failure, labels, tables and coverage are counted, and
 -- values that are generated inside have the test's seed and size. It may also throw, as the
@@ -113,8 +114,9 @@ underSchedule body drawn = ioRose $ do
     latest <- newIORef (MkRose rejected [])
     over <- newIORef Nothing
     shown <- newIORef Nothing
+    idle <- newIORef True
     -- While it is shrunk, which is after the exploration, the property may simulate again.
-    let simulateBy explored act = maybe (explored act) (later act) =<< readIORef over
+    let simulateBy explored act = writeIORef idle False >> readIORef over >>= maybe (explored act) (later act)
         later act chosen = do
           run <- simulateWith (planOptions plan) {scheduled = chosen} act
           -- The schedule may not fit the shrunk values.
@@ -126,7 +128,9 @@ underSchedule body drawn = ioRose $ do
       rose@(MkRose result _) <- reduceRose (ioRose (body (simulateBy explored)))
       writeIORef latest rose
       for_ (theException result) $ \e -> when (isCancellation e) (throwIO e)
-      when (falsified result) (throwIO Falsified)
+      -- A case that is discarded need not simulate.
+      discarded <- (isNothing (ok result) &&) <$> readIORef idle
+      when (falsified result || discarded) (throwIO Falsified)
     writeIORef over (Just (either failingSchedule (const drawn) found))
     writeIORef shown (either Just (const Nothing) found)
     readIORef latest >>= explained shown
