@@ -108,8 +108,8 @@
 -- > parallel drive (steer `finally` forkIO (throwTo me EmergencyStop))
 --
 -- A behaviour that never reaches a point where it can be interrupted does not stop: a loop
--- that never allocates (compile it with @-fno-omit-yields@), a safe foreign call (import it
--- @interruptible@). A behaviour cannot rely on recovering from
+-- that never allocates (compile with @-fno-omit-yields -fno-full-laziness@: the page
+-- @docs\/interruption.md@ says why), a safe foreign call (import it @interruptible@). A behaviour cannot rely on recovering from
 -- 'Control.Exception.BlockedIndefinitelyOnMVar' and similar exceptions, because GHC throws
 -- them to the operator that waits for the behaviour, too.
 module Behavior

@@ -16,8 +16,9 @@ import Data.Maybe (isNothing)
 import Foreign.C (CInt (..))
 import GHC.Conc (ThreadStatus (..), threadStatus)
 import System.Exit (ExitCode (..))
-import System.IO (hFlush, stdout)
+import System.IO (hFlush, hGetContents, hGetLine, hPutStrLn, stderr, stdout)
 import System.Mem (performMajorGC)
+import System.Posix.IO (closeFd, createPipe, dupTo, fdToHandle, stdError)
 import System.Posix.Process (ProcessStatus (..), exitImmediately, forkProcess, getProcessStatus)
 import System.Posix.Signals
 import Test.Hspec
@@ -185,6 +186,13 @@ spec = guarded . describe "runBehavior" $ do
         Ignore -> pure ()
         _ -> expectationFailure "a handler is installed"
 
+  it "ends the process at a second SIGTERM while a loop that never allocates runs, and prints why" $ do
+    -- Sometimes another thread runs before the loop begins, and answers the first signal.
+    let unanswered n = spinning >>= \end -> if null (snd end) && n > (0 :: Int) then unanswered (n - 1) else pure end
+    (end, printed) <- unanswered 20
+    end `shouldBe` Terminated sigTERM False
+    printed `shouldContain` "-fno-omit-yields"
+
   it "waits for an action in runInBoundThread, which nothing interrupts" $
     when rtsSupportsBoundThreads $ do
       entries <- newLog
@@ -233,6 +241,31 @@ spec = guarded . describe "runBehavior" $ do
     ThreadBlocked _ -> True
     _ -> False
   bound act = if rtsSupportsBoundThreads then runInBoundThread act else act
+
+-- | A child in a loop that never allocates, which gets SIGTERM again and again: how it ended, and what
+-- it has printed.
+spinning :: IO (ProcessStatus, String)
+spinning = do
+  (output, input) <- createPipe
+  child <- forkProcess $ do
+    _ <- dupTo input stdError
+    closeFd output
+    closeFd input
+    _ <- scheduleAlarm 20
+    byDefault sigTERM
+    setNumCapabilities 1
+    let loop = void (evaluate ('a' `elem` cycle "b"))
+    end <- try (runBehavior (hPutStrLn stderr "now" >> raiseHere sigTERM >> loop))
+    exitImmediately (fromLeft ExitSuccess end)
+  closeFd input
+  printed <- fdToHandle output
+  hGetLine printed `shouldReturn` "now"
+  -- (The child looks at a clock that a test cannot advance.)
+  let untilEnded = signalProcess sigTERM child >> getProcessStatus False False child >>= maybe (threadDelay 20000 >> untilEnded) pure
+  (,) <$> untilEnded <*> hGetContents printed
+
+-- | Raises it without letting another Haskell thread run.
+foreign import ccall unsafe "raise" raiseHere :: Signal -> IO CInt
 
 -- | The action of the installed handler.
 installed :: Signal -> IO (IO ())

@@ -18,6 +18,9 @@
 --     the default. So where the default was installed before, this handler stays installed,
 --     and does (B).
 --
+-- (D) GHC calls no handler while a loop that never allocates keeps it from running other threads.
+--     Then the second signal ends the process (in @signals.c@).
+--
 -- Two things are special about SIGHUP. Where it is ignored when the first run begins (by nohup),
 -- it stays ignored. And a second one has no effect: when a terminal is closed, the shell and the
 -- kernel send one each.
@@ -115,6 +118,7 @@ enter = do
       handlerBefore <- installHandler signal handler Nothing
       -- (C)
       stayed <- isOurs signal handlerBefore
+      watch signal
       pure (signal, if stayed then Default else handlerBefore)
     pure known {before = old}
 
@@ -133,7 +137,7 @@ leave (n, state) = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
 
 -- | The handler of a signal.
 received :: Signal -> IO ()
-received signal = uninterruptibleMask_ . modifyMVar_ process $ here >=> \known -> do
+received signal = uninterruptibleMask_ . (answer >>) . modifyMVar_ process $ here >=> \known -> do
   there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
   case there of
     -- (B)
@@ -187,6 +191,13 @@ isIgnoredHangup signal
 
 -- | Whether the process ignores the signal: 1 or 0.
 foreign import ccall unsafe "behavior_lang_ignores" ignores :: CInt -> IO CInt
+
+-- | Lets the second of two signals, if no Haskell thread has answered the first for two seconds,
+-- print why and end the process. To be called when the handler has been installed.
+foreign import ccall unsafe "behavior_lang_watch" watch :: CInt -> IO ()
+
+-- | The answer to a signal.
+foreign import ccall unsafe "behavior_lang_answer" answer :: IO ()
 
 -- | The name of a signal that is handled here.
 nameOf :: Signal -> String

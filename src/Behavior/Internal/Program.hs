@@ -26,8 +26,10 @@ import Behavior.Internal.Trace.Event (Cause (..))
 --   cancels the behaviour. When that has ended, cleanup included, the process ends with 130,
 --   143 or 129. A second SIGINT or SIGTERM ends it at once; a second SIGHUP does not, because
 --   a terminal that is closed sends two. Where SIGHUP is ignored when the behaviour begins
---   (@nohup@), it stays ignored. After it the terminal is gone and printing throws an
+--   (@nohup@), it stays ignored. When its terminal was closed, printing throws an
 --   'System.IO.Error.IOError': a cleanup that prints before it stops the motors does not stop them.
+-- * While a loop that never allocates runs, GHC runs nothing else, and a signal has no effect. Then a
+--   second SIGINT or SIGTERM, two seconds later, ends the process, and prints what the cause may be.
 --
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
 -- instead of the exit. A signal that comes too late to cancel the behaviour is raised
