@@ -1,13 +1,15 @@
 -- |
 -- Whether something runs in constant memory, measured by the bytes that are live
 -- after a major garbage collection (a thread's stack is among them) at two points of
--- the same run.
+-- the same run. And how much an action allocates, which is a measure of its work that does not
+-- depend on the machine's load.
 --
 -- The runtime must keep statistics: run it with @+RTS -T@.
 module Memory
   ( inConstantMemory
   , growingByLessThan
   , liveBytes
+  , allocatedBy
   ) where
 
 import Control.Monad (when)
@@ -44,3 +46,13 @@ liveBytes :: IO Int64
 liveBytes = do
   performMajorGC
   fromIntegral . gcdetails_live_bytes . gc <$> getRTSStats
+
+-- | The number of bytes that all threads have allocated while the action ran.
+allocatedBy :: IO a -> IO Int64
+allocatedBy act = do
+  before' <- allocated
+  _ <- act
+  subtract before' <$> allocated
+ where
+  -- (Only a collection makes the number exact.)
+  allocated = performMajorGC >> fromIntegral . allocated_bytes <$> getRTSStats

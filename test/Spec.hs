@@ -29,6 +29,7 @@ import qualified Behavior.ResumableSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
 import qualified Behavior.STMSpec
+import qualified Behavior.ScaleSpec
 import qualified Behavior.ScopedSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
@@ -108,6 +109,7 @@ main = hspec $ do
   describe "Space" $ do
     Behavior.SpaceSpec.spec
     Behavior.ReactiveSpaceSpec.spec
+    Behavior.ScaleSpec.spec
   describe "Simulation" $ do
     Sim.SimulateSpec.spec
     Sim.DeliverySpec.spec

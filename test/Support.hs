@@ -13,6 +13,7 @@ module Support
     guarded
   , within
   , leavingNothing
+  , onOneCapability
 
     -- * Gates
   , Gate
@@ -121,6 +122,10 @@ leavingNothing act = mask $ \restore -> do
   unless (after == before) . expectationFailure $
     show (after - before) ++ " threads were left running"
   either (\(e :: SomeException) -> throwIO e) pure end
+
+-- | Runs the action on one of GHC's capabilities.
+onOneCapability :: IO a -> IO a
+onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCapabilities . const
 
 -- | Blocks the threads that pass it until it is opened; it is never closed again.
 newtype Gate = Gate (TVar Bool)

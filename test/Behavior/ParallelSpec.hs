@@ -269,8 +269,6 @@ ties = do
         open mayGo
         awaitEnd caller
     length (filter (== end) ends) `shouldSatisfy` (> 25)
-  onOneCapability act =
-    bracket (getNumCapabilities <* setNumCapabilities 1) setNumCapabilities (const act)
 
 -- parallel and both -----------------------------------------------------------
 

@@ -3,9 +3,7 @@
 -- run two branches at the same time in a million switches.
 module Behavior.ReactiveSpaceSpec (spec) where
 
-import Control.Concurrent (getNumCapabilities, setNumCapabilities)
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (bracket)
 import Control.Monad (replicateM_, unless)
 import Test.Hspec
 
@@ -68,6 +66,3 @@ spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In co
     inConstantMemory 100000 $ \step ->
       Signal.withShared (Signal.hysteresis False 0 1 (pure (1 :: Int))) $ \s ->
         replicateM_ 100000 (step >> Signal.waitUntil s)
-
-onOneCapability :: IO a -> IO a
-onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCapabilities . const

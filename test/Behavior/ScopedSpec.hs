@@ -1,3 +1,4 @@
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
@@ -16,7 +17,8 @@ import Test.Hspec hiding (parallel)
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Parallel
-import Behavior.Time (atomically)
+import Behavior.Sim (Outcome (Failing, Faulting, Returned), Run (outcome), explain, explore, randomly)
+import Behavior.STM (atomically, check, newTVarIO, readTVar, writeTVar)
 import Support
 
 spec :: Spec
@@ -134,9 +136,22 @@ spec = guarded $ do
         yielding n
       end `shouldBe` Gave ()
 
+  it "loses no fault of a child, also when it is stopped just as it forgets the children that have ended" $
+    void . explore (randomly 300) $ \simulate' -> do
+      faults <- newTVarIO False
+      let faulty = atomically (writeTVar faults True) >> throwIO (Fault "child")
+          body nursery = replicateM_ 14 (fork nursery (pure ())) >> void (fork nursery faulty :: IO (Child ())) >> fork nursery (pure ()) >> hang
+      run <- simulate' (scoped body ||| atomically (readTVar faults >>= check))
+      endOf (outcome run) `shouldBe` FaultedWith (show (Fault "child"))
+
   describe "what fork returns" children
  where
   yielding n = replicateM_ (n `mod` 20) yield
+  endOf = \case
+    Returned a -> Gave a
+    Failing e -> endingOf (Left e)
+    Faulting e -> endingOf (Left e)
+    other -> FaultedWith (explain other)
 
 children :: Spec
 children = do

@@ -11,9 +11,7 @@ import Control.Exception hiding (Deadlock)
 import Control.Monad (forM_, forever, void, when)
 import Data.List (isInfixOf)
 import GHC.Clock (getMonotonicTime)
-import GHC.Stats (RTSStats (allocated_bytes), getRTSStats)
 import System.IO.Unsafe (unsafePerformIO)
-import System.Mem (performMajorGC)
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -22,6 +20,7 @@ import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
 import Behavior.Time (atomically, checkpoint)
+import Memory (allocatedBy)
 import Support (guarded)
 
 spec :: Spec
@@ -152,12 +151,6 @@ wide = do
     few <- allocated schedule moment 1000
     many <- allocated schedule moment 10000
     (many `div` 1000, few `div` 1000) `shouldSatisfy` \(m, f) -> m <= 12 * f
-  -- The allocation is a measure of the cost that does not depend on the machine's load.
-  allocated schedule moment n = do
-    performMajorGC
-    before' <- allocated_bytes <$> getRTSStats
+  allocated schedule moment n = allocatedBy $ do
     run <- simulateWith defaultSimOptions {scheduled = schedule, realTimeLimit = 60} (allOf [sleep (moment i) | i <- [1 .. n :: Int]])
     explain (outcome run) `shouldBe` "it returned"
-    performMajorGC
-    after' <- allocated_bytes <$> getRTSStats
-    pure (after' - before')

@@ -22,7 +22,7 @@ module Behavior.Internal.Nursery
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), Exception (..), SomeException, finally, mask_, throwIO)
-import Control.Monad (filterM, foldM, (>=>))
+import Control.Monad (foldM, unless, (>=>))
 import Data.Foldable (asum, traverse_)
 
 import Behavior.Internal.Failure
@@ -37,13 +37,19 @@ import Behavior.Internal.Trace.Event (Cause (..))
 
 -- | A place where behaviours run beside a 'scoped' one.
 --
+-- (The stage and the requests are in separate variables: a thread that waits in 'fork' reads the
+-- stage, and must not be woken by each request of another.)
+--
 -- @since 0.1.0.0
-newtype Nursery = Nursery (TVar Stage)
+data Nursery = Nursery
+  { stage :: !(TVar Stage)
+  , requests :: !(TVar [Request])
+  -- ^ Those that the scope's thread has not served yet, the newest first.
+  }
 
 -- | The stage of a nursery.
 data Stage
-  = -- | The requests to the scope's thread, the newest first.
-    Open [Request]
+  = Open
   | -- | Everything is being stopped. A child may be forking just then; a cleanup may fork, too.
     Ending
   | -- | Everything has ended.
@@ -58,7 +64,7 @@ data Request
 -- | The handle of a forked behaviour: it gives the behaviour's result, or how else it ended.
 --
 -- @since 0.1.0.0
-data Child a = Child (TVar Stage) (Branch a)
+data Child a = Child !Nursery !(Branch a)
 
 -- | The failure that 'await' throws for a child that was stopped.
 --
@@ -94,48 +100,40 @@ instance Exception ChildStopped where
 -- @since 0.1.0.0
 scoped :: (Nursery -> Behavior a) -> Behavior a
 scoped body = do
-  stage <- newTVarIO (Open [])
-  structured "scoped" (\scope -> serveRequests stage scope (body (Nursery stage)) `finally` atomically (writeTVar stage Ending))
-    `finally` atomically (writeTVar stage Closed)
+  nursery <- Nursery <$> newTVarIO Open <*> newTVarIO []
+  let enter = atomically . writeTVar (stage nursery)
+  structured "scoped" (\scope -> serveRequests nursery scope (body nursery) `finally` enter Ending)
+    `finally` enter Closed
 
 -- | Serves the requests to start and stop children, until there is a verdict.
-serveRequests :: TVar Stage -> Scope -> Behavior a -> IO (Verdict a)
-serveRequests stage scope body = do
+serveRequests :: Nursery -> Scope -> Behavior a -> IO (Verdict a)
+serveRequests nursery scope body = do
   failure <- newLeftmost
   main <- branch scope (Label "scoped" "body") body
-  let -- How many were forked; the children that may still run; and the number of forks at which
-      -- to remove those that have ended.
-      serve count children sweepAt = do
+  let -- How many were forked, and at which number the scope is to forget those that have ended. That
+      -- walks over all of them, so it waits for as many forks as there are branches left.
+      serve count sweepAt = do
         next <- atomically (asum [Left . endedBy "body" <$> outcome main, Left . thrown <$> readLeftmost failure, Right <$> requested])
         case next of
           Left verdict -> pure verdict
           Right new -> do
-            (count', children') <- foldM handleRequest (count, children) new
+            let stops = [child | Stop child <- new]
+            unless (null stops) $ requestStopAsync (FromOutside "requestStop") stops
+            count' <- foldM startChild count new
             if count' < sweepAt
-              then serve count' children' sweepAt
-              else do
-                running <- filterM mayRun children'
-                serve count' running (count' + max 16 (length running))
-      handleRequest (count, children) = \case
-        Stop child -> (count, children) <$ requestStopAsync (FromOutside "requestStop") [child]
+              then serve count' sweepAt
+              else forgetEnded scope >>= \left -> serve count' (count' + max 16 left)
+      startChild count = \case
+        Stop _ -> pure count
         Fork act accepted -> do
           let n = count + 1 :: Int
           -- Masked: a branch that was started is also handed over.
-          child <- mask_ $ do
-            new <- branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act
-            new <$ atomically (putTMVar accepted new)
-          pure (n, SomeBranch child : children)
-      thrown (n, e) = Verdict (SiblingFailed ("fork " ++ show n)) (throwIO e)
-      requested =
-        readTVar stage >>= \case
-          Open new@(_ : _) -> reverse new <$ writeTVar stage (Open [])
-          _ -> retry
-      -- Nothing is kept of a child that has ended without an exception.
-      mayRun (SomeBranch child) =
-        tryReadOutcome child >>= \end -> case thrownBy <$> end of
-          Just Nothing -> False <$ forget scope child
-          _ -> pure True
-  serve 0 [] 16
+          mask_ $ branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act >>= atomically . putTMVar accepted
+          pure n
+  serve 0 16
+ where
+  thrown (n, e) = Verdict (SiblingFailed ("fork " ++ show n)) (throwIO e)
+  requested = readTVar (requests nursery) >>= \new -> check (not (null new)) >> reverse new <$ writeTVar (requests nursery) []
 
 -- | What a child has thrown, unless it was stopped.
 thrownBy :: Outcome a -> Maybe SomeException
@@ -156,18 +154,18 @@ thrownBy = \case
 --
 -- @since 0.1.0.0
 fork :: Nursery -> Behavior a -> Behavior (Child a)
-fork (Nursery stage) act = do
+fork nursery act = do
   accepted <- newEmptyTMVarIO
   atomically $
-    readTVar stage >>= \case
-      Open waiting -> writeTVar stage (Open (Fork act accepted : waiting))
+    readTVar (stage nursery) >>= \case
+      Open -> request nursery (Fork act accepted)
       Ending -> failEnding
       Closed -> throwSTM (ErrorCall "fork: the nursery's scoped behaviour has ended")
-  Child stage <$> atomically (takeTMVar accepted `orElse` unlessOpen)
+  Child nursery <$> atomically (takeTMVar accepted `orElse` unlessOpen)
  where
   unlessOpen =
-    readTVar stage >>= \case
-      Open _ -> retry
+    readTVar (stage nursery) >>= \case
+      Open -> retry
       _ -> failEnding
   failEnding = failWith "fork: the nursery's scoped behaviour is ending"
 
@@ -216,9 +214,12 @@ tryAwait (Child _ child) = fmap ending <$> tryReadOutcomeSTM child
 --
 -- @since 0.1.0.0
 requestStop :: Child a -> Behavior ()
-requestStop (Child stage child) =
+requestStop (Child nursery child) =
   atomically $
-    readTVar stage >>= \case
-      Open waiting -> writeTVar stage (Open (Stop (SomeBranch child) : waiting))
+    readTVar (stage nursery) >>= \case
+      Open -> request nursery (Stop (SomeBranch child))
       -- It is being stopped with the rest, or has ended.
       _ -> pure ()
+
+request :: Nursery -> Request -> STM ()
+request nursery new = modifyTVar' (requests nursery) (new :)

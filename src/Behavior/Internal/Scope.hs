@@ -36,6 +36,7 @@ module Behavior.Internal.Scope
   , branchWithHook
   , worker
   , forget
+  , forgetEnded
   , requestStopAsync
   , requestStop
 
@@ -227,6 +228,22 @@ forget (Scope branches) old = modifyIORef' branches without
   without (SomeBranch b : others)
     | branchId b == branchId old = others
     | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
+
+-- | Removes from the scope all branches that have ended and did not fault, in one walk over it, and
+-- gives how many are left. (To 'forget' one of them is a walk over all that are newer.)
+forgetEnded :: Scope -> IO Int
+forgetEnded (Scope branches) = do
+  (left, oldestFirst) <- readIORef branches >>= foldM without (0, [])
+  left <$ (writeIORef branches $! reverse oldestFirst)
+ where
+  without (left, others) this@(SomeBranch b) = do
+    end <- tryReadOutcome b
+    pure $! case end of
+      Nothing -> keep
+      Just (Faulted _) -> keep
+      Just _ -> (left, others)
+   where
+    keep = let left' = left + 1 :: Int in left' `seq` (left', this : others)
 
 -- | Requests the stop of all the branches together, by helper threads: a branch that cannot be
 -- interrupted at the moment does not delay the request of another. It does not wait until

@@ -14,7 +14,7 @@ module Behavior.Internal.Reactive.Engine
 
 import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
-import Data.Maybe (catMaybes, isJust)
+import Data.Maybe (isJust)
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime (Label (..), Seconds, atomically, tryReadThenBlock)
@@ -193,18 +193,12 @@ recover engine sensors decision name recovery taskOutcome = do
     (Right (EndWith a), Nothing) -> concluding (pure a)
     (Right BeginAgain, Nothing) -> do
       forget (scope engine) recovered
-      faults <- catMaybes <$> traverse (awaitStopped (scope engine)) sensors
-      case faults of
+      ends <- traverse awaitOutcome sensors
+      -- (What has faulted stays in the scope.)
+      _ <- forgetEnded (scope engine)
+      case [fault | Faulted fault <- ends] of
         [] -> startOver engine Reread (Just (decidedOn decision))
         fault : _ -> concluding (throwIO fault)
  where
   -- (Only sensors are left, whose stop has been requested.)
   concluding = pure . Verdict (cause decision)
-
--- | Waits until a branch whose stop was requested has ended. If it faulted it stays
--- in the scope, which throws its fault.
-awaitStopped :: Scope -> Branch () -> IO (Maybe SomeException)
-awaitStopped within sensor =
-  awaitOutcome sensor >>= \case
-    Faulted fault -> pure (Just fault)
-    _ -> Nothing <$ forget within sensor

@@ -1,0 +1,58 @@
+-- |
+-- Work that grows with the number of branches, and not with its square.
+module Behavior.ScaleSpec (spec) where
+
+import Control.Monad (replicateM, replicateM_)
+import Data.Foldable (for_)
+import Data.Int (Int64)
+import GHC.Stats (RTSStats (mutator_cpu_ns), getRTSStats)
+import Test.Hspec
+
+import Behavior
+import Behavior.Parallel (await, fork, scoped)
+import Behavior.STM (atomically, check, newTVarIO, readTVar, writeTVar)
+import Memory (allocatedBy)
+import Support
+
+-- | (On one capability: with several, how often threads wake each other in vain depends on how the
+-- capabilities are loaded.)
+spec :: Spec
+spec = around_ (within 60 . leavingNothing . onOneCapability) . describe "A scoped behaviour works in proportion to" $ do
+  it "the number of its children that end while as many newer ones run" $
+    (2000, 4000) `takesAtMost` 2.5 $ \n ->
+      allocatedBy . scoped $ \nursery -> do
+        gate <- newGate
+        old <- replicateM n (fork nursery (pass gate))
+        replicateM_ n (fork nursery (sleep 3600))
+        open gate
+        for_ old (atomically . await)
+        -- The nursery forgets the old ones when there are more.
+        replicateM_ n (fork nursery (pure ()) >>= atomically . await)
+
+  it "the number of its children that fork at the same time" $
+    (4000, 16000) `takesAtMost` 7 $ \n ->
+      processorTime . scoped $ \nursery -> do
+        begin <- newTVarIO False
+        children <- replicateM n . fork nursery $ do
+          atomically (readTVar begin >>= check)
+          fork nursery (pure ()) >>= atomically . await
+        atomically (writeTVar begin True)
+        for_ children (atomically . await)
+
+-- | For the second size the work is at most the given number of times that for the first. (The
+-- least of three measurements counts.)
+takesAtMost :: (Int, Int) -> Double -> (Int -> IO Int64) -> Expectation
+takesAtMost (few, many) times work = do
+  less <- least few
+  more <- least many
+  (less, more) `shouldSatisfy` \_ -> fromIntegral more < times * fromIntegral less
+ where
+  least n = minimum <$> replicateM 3 (work n)
+
+-- | The nanoseconds of processor time that all threads have used while the action ran, without
+-- the garbage collector's.
+processorTime :: IO a -> IO Int64
+processorTime act = do
+  before' <- mutator_cpu_ns <$> getRTSStats
+  _ <- act
+  subtract before' . mutator_cpu_ns <$> getRTSStats
