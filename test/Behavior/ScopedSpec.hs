@@ -18,7 +18,7 @@ import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Parallel
 import Behavior.Sim (Outcome (Failing, Faulting, Returned), Run (outcome), explain, explore, randomly)
-import Behavior.STM (atomically, check, newTVarIO, readTVar, writeTVar)
+import Behavior.STM (atomically, check, modifyTVar', newTVarIO, readTVar, writeTVar)
 import Support
 
 spec :: Spec
@@ -50,13 +50,11 @@ spec = guarded $ do
 
   it "lets a forked behaviour fork others, and all end together" $ do
     (end, done) <- observing $ \entries -> do
-      inside <- newGate
-      let generation nursery n
-            | n == 0 = open inside >> hang
-            | otherwise = do
-                _ <- fork nursery (generation nursery (n - 1 :: Int))
-                hang `onException` note entries n
-      scoped $ \nursery -> fork nursery (generation nursery 5) >> pass inside
+      hanging <- newTVarIO (0 :: Int)
+      let generation nursery n = do
+            _ <- if n == 1 then fork nursery hang else fork nursery (generation nursery (n - 1 :: Int))
+            (atomically (modifyTVar' hanging (+ 1)) >> hang) `onException` note entries n
+      scoped $ \nursery -> fork nursery (generation nursery 5) >> atomically (readTVar hanging >>= check . (== 5))
     end `shouldBe` Gave ()
     done `shouldMatchList` [1 .. 5]
 
@@ -291,12 +289,14 @@ children = do
       atomically (await child)
     (end, done) `shouldBe` (Gave 'a', ["went on"])
 
-  it "loses no stop request, whichever thread makes it" $
+  it "loses no stop request, whichever thread makes it, and how many are made at once" $
     for_ [1 .. 100 :: Int] $ \_ ->
       scoped $ \nursery -> do
         some <- replicateM 10 (fork nursery hang) :: IO [Child ()]
+        others <- replicateM 10 (fork nursery hang)
         for_ some $ \child -> fork nursery (requestStop child)
-        for_ some $ \child -> ending (atomically (await child)) `shouldReturn` stopped
+        for_ others requestStop
+        for_ (some ++ others) $ \child -> ending (atomically (await child)) `shouldReturn` stopped
 
   it "is stopped with all others when its scoped behaviour ends while its stop is being requested" $
     for_ [1 .. 300 :: Int] $ \n -> do
