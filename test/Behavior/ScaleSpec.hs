@@ -1,5 +1,5 @@
 -- |
--- Work that grows with the number of branches, and not with its square.
+-- Work that grows with the number of branches, or of filters, and not with its square.
 module Behavior.ScaleSpec (spec) where
 
 import Control.Monad (replicateM, replicateM_)
@@ -10,14 +10,20 @@ import Test.Hspec
 
 import Behavior
 import Behavior.Parallel (await, fork, scoped)
-import Behavior.STM (atomically, check, newTVarIO, readTVar, writeTVar)
+import qualified Behavior.Signal as Signal
+import Behavior.STM (atomically, check, modifyTVar', newTVarIO, readTVar, writeTVar)
 import Memory (allocatedBy)
 import Support
 
 -- | (On one capability: with several, how often threads wake each other in vain depends on how the
 -- capabilities are loaded.)
 spec :: Spec
-spec = around_ (within 60 . leavingNothing . onOneCapability) . describe "A scoped behaviour works in proportion to" $ do
+spec = around_ (within 60 . leavingNothing . onOneCapability) $ do
+  describe "A scoped behaviour works in proportion to" children
+  describe "Eight filters in each other work for a change at most eight times as much as one:" filters
+
+children :: Spec
+children = do
   it "the number of its children that end while as many newer ones run" $
     (2000, 4000) `takesAtMost` 2.5 $ \n ->
       allocatedBy . scoped $ \nursery -> do
@@ -33,11 +39,32 @@ spec = around_ (within 60 . leavingNothing . onOneCapability) . describe "A scop
     (6000, 24000) `takesAtMost` 9 $ \n ->
       processorTime . scoped $ \nursery -> do
         begin <- newTVarIO False
-        children <- replicateM n . fork nursery $ do
+        forking <- replicateM n . fork nursery $ do
           atomically (readTVar begin >>= check)
           fork nursery (pure ()) >>= atomically . await
         atomically (writeTVar begin True)
-        for_ children (atomically . await)
+        for_ forking (atomically . await)
+
+-- (More of them work more than in proportion: docs/signals.md.)
+filters :: Spec
+filters =
+  for_ all' $ \(name, filtering) ->
+    it name $
+      (1, 8) `takesAtMost` 8 $ \depth -> allocatedBy $ do
+        level <- newTVarIO (0 :: Int)
+        seen <- newTVarIO (0 :: Int)
+        let change k = do
+              atomically (writeTVar level (k `mod` 2))
+              atomically (readTVar seen >>= check . (> k))
+        Signal.switch (iterate filtering (Signal.watching (readTVar level)) !! depth) (\_ -> atomically (modifyTVar' seen (+ 1)) >> hang)
+          ||| for_ [0 .. 200] change
+ where
+  all' =
+    [ ("debounce", Signal.debounce 0)
+    , ("throttle", Signal.throttle 0)
+    , ("hysteresis", fmap fromEnum . Signal.hysteresis False 0 1)
+    , ("changes", Signal.changes)
+    ]
 
 -- | For the second size the work is at most the given number of times that for the first. (The
 -- least of three measurements counts.)

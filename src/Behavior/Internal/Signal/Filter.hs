@@ -233,6 +233,9 @@ keeping :: View a -> STM (Kept a)
 keeping seen = ignoreErrors seen >>= \a -> Kept a <$> readings seen
 
 -- | The view that shows what a filter keeps. The source is read too, so that what it throws is thrown.
+--
+-- (With filters in each other, all below are read, and a change of one wakes the threads of all above: at
+-- depth n, n changes wake up to n threads, which read up to n variables.)
 showingKept :: TVar (Maybe (Kept a)) -> View a -> View a
 showingKept variable seen = (mapView (*> (kept <$> value)) seen) {readings = keptReadings <$> value}
  where
