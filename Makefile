@@ -1,10 +1,11 @@
-.PHONY: help demo test programs warnings doctest readme lint docs check matrix bench bench-check soak signals reality attacks mutants ci clean
+.PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak signals reality attacks mutants ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
 	@echo '               (ROBOT=patrol, pick-and-place, drone or fleet runs another robot)'
 	@echo 'make test      the test suite, under three runtimes (ARGS="-m NAME" selects tests)'
 	@echo 'make programs  run the example programs and check how each run ends'
+	@echo 'make skeleton  run and test a copy of docs/your-own-robot, outside of this checkout'
 	@echo 'make warnings  build everything with warnings as errors'
 	@echo 'make doctest   run the examples in the documentation'
 	@echo 'make readme    run the program in README.md'
@@ -33,7 +34,7 @@ endif
 test:
 	@.ci/test $(ARGS)
 
-programs warnings doctest readme lint docs check:
+programs skeleton warnings doctest readme lint docs check:
 	@.ci/$@
 
 matrix:

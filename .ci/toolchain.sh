@@ -179,3 +179,12 @@ binary() {
     stack*) echo "$(run_stack path --dist-dir)/build/${1#*:}/${1#*:}" ;;
   esac
 }
+
+# --- copying ----------------------------------------------------------------
+
+# The files of the working tree, committed or not, as an archive.
+sources() {
+  git -c safe.directory="$PWD" ls-files -co --exclude-standard -z | while IFS= read -r -d '' file; do
+    [ ! -e "$file" ] || printf '%s\0' "$file"
+  done | tar --null -T - -c
+}
