@@ -10,6 +10,7 @@ module Places
   ) where
 
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
+import Control.Concurrent.STM.TSem (newTSem)
 import Control.Exception (SomeException, throwIO)
 import Control.Monad (void)
 import Data.Foldable (traverse_)
@@ -19,8 +20,9 @@ import Behavior
 import Behavior.Internal.Runtime (Label (..))
 import Behavior.Message (handleNext, onMessage, withInbox)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
+import Behavior.STM (withTSem)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (abandoning, atomically, timeout)
+import Behavior.Time (abandoning, atomically, timeout, timeoutAt)
 import Behavior.Trace (named, withTrace)
 import Support
 
@@ -71,6 +73,7 @@ places =
   , inThread "pinned" "body" pinned
   , inThread "unpinned" "body" unpinned
   , inThread "timeout" "branch" (timeout 3600)
+  , inThread "timeoutAt" "branch" (timeoutAt (1 / 0))
   , inThread "abandoning" "branch" (abandoning 3600)
   , inThread "rSelect" "left" (\act -> Signal.rSelect (pure True) act hang)
   , inThread "rSelect" "right" (\act -> rSelect (pure False) hang act)
@@ -84,6 +87,9 @@ places =
       Signal.teleoReactive [(pure False, hang), (pure True, act)]
   , inThread "insteadWhen" "branch" (Signal.insteadWhen (pure False) hang)
   , inThread "insteadWhen" "emergency" (\act -> Signal.insteadWhen (pure True) act hang)
+  , inThread "pausedWhile" "branch" (Signal.pausedWhile (pure False) hang hang)
+  , inThread "stoppedWhile" "branch" (Signal.stoppedWhile (pure False))
+  , inPlace "withTSem" (\act -> atomically (newTSem 1) >>= (`withTSem` act))
   , inThread "onMessage" "task" (\act -> withMessages [] (\inbox -> onMessage inbox (\() -> hang) act))
   , inThread "onMessage" "handler" $ \act ->
       withMessages [()] (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure ()))

@@ -4,6 +4,7 @@ import Test.Hspec
 
 import qualified Behavior.TimerWheelSpec
 import qualified Behavior.AbandoningSpec
+import qualified Behavior.AgreeingSpec
 import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
@@ -16,6 +17,7 @@ import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
 import qualified Behavior.ParallelSpec
+import qualified Behavior.PausingSpec
 import qualified Behavior.PinnedSpec
 import qualified Behavior.PolledSpec
 import qualified Behavior.PollingSpec
@@ -31,6 +33,7 @@ import qualified Behavior.RuntimeSpec
 import qualified Behavior.STMSpec
 import qualified Behavior.ScaleSpec
 import qualified Behavior.ScopedSpec
+import qualified Behavior.SemaphoreSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
 import qualified Behavior.CancellationStressSpec
@@ -74,6 +77,7 @@ main = hspec $ do
   describe "Parallel" $ do
     Behavior.ParallelSpec.spec
     Behavior.DecideSpec.spec
+    Behavior.AgreeingSpec.spec
     Behavior.PinnedSpec.spec
     describe "scoped and fork" Behavior.ScopedSpec.spec
   describe "Signal" $ do
@@ -88,6 +92,7 @@ main = hspec $ do
     Behavior.ReactiveSpec.spec
     Behavior.MonitorSpec.spec
     Behavior.InsteadWhenSpec.spec
+    Behavior.PausingSpec.spec
   describe "The paper's rSelect and monitor" Behavior.PolledSpec.spec
   describe "Time" $ do
     Behavior.TimeSpec.spec
@@ -98,6 +103,7 @@ main = hspec $ do
   describe "STM" $ do
     Behavior.STMSpec.spec
     describe "resumable" Behavior.ResumableSpec.spec
+    describe "withTSem" Behavior.SemaphoreSpec.spec
   describe "Messages" Behavior.MessageSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec

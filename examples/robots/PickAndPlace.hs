@@ -11,7 +11,6 @@ module PickAndPlace
   ) where
 
 import Control.Exception (finally)
-import Data.List (tails)
 
 import Behavior
 import qualified Behavior.Parallel as Parallel
@@ -63,10 +62,6 @@ grip arm position = do
 -- | The position on which two detectors agree: at most one centimetre apart. It does not wait for a
 -- third one, which may hang.
 locate :: [Behavior Double] -> Behavior Double
-locate = Parallel.decide $ \ends ->
-  let found = [position | Just (Right position) <- ends]
-      agreed = [(a + b) / 2 | a : others <- tails found, b <- others, abs (a - b) <= 1]
-   in case (agreed, sequence ends) of
-        (position : _, _) -> Just (pure position)
-        ([], Just _) -> Just (failWith "no two detectors agree")
-        _ -> Nothing
+locate = fmap mean . Parallel.agreeing 2 (\a b -> abs (a - b) <= 1)
+ where
+  mean positions = sum positions / fromIntegral (length positions)

@@ -12,6 +12,8 @@
 -- | 'decide'                        | what a function  | the result of the behaviour   |
 -- |                                 | of the ends says | that the function chooses     |
 -- +---------------------------------+------------------+-------------------------------+
+-- | 'agreeing'                      | M that agree     | their results                 |
+-- +---------------------------------+------------------+-------------------------------+
 -- | 'scoped' and 'fork'             | the scoped one   | its result                    |
 -- +---------------------------------+------------------+-------------------------------+
 --
@@ -32,6 +34,7 @@ module Behavior.Parallel
   , firstOf
   , allOf
   , decide
+  , agreeing
 
     -- * Starting more while a behaviour runs
   , scoped

@@ -41,6 +41,10 @@ module Behavior.Signal
   , monitor
   , insteadWhen
 
+    -- ** Pausing
+  , pausedWhile
+  , stoppedWhile
+
     -- ** Many branches
   , switch
   , teleoReactive
@@ -51,6 +55,7 @@ module Behavior.Signal
   ) where
 
 import Behavior.Internal.Reactive.Operators
+import Behavior.Internal.Reactive.Pausing
 import Behavior.Internal.Signal.Filter
 import Behavior.Internal.Signal.Polling
 import Behavior.Internal.Signal.Shared

@@ -13,6 +13,7 @@ module Behavior.Time
     -- * Waiting
   , sleep
   , sleepUntil
+  , sleepForever
   , atomically
   , checkpoint
 
@@ -23,6 +24,7 @@ module Behavior.Time
 
     -- * Limits
   , timeout
+  , timeoutAt
   , TimedOut (..)
   , cleanupWithin
 

@@ -2,10 +2,14 @@
 -- Trying again after a pause, and doing something periodically.
 module Behavior.RepeatingSpec (spec) where
 
+import Control.Concurrent (forkIO, killThread, mkWeakThreadId, yield)
 import Control.Exception
-import Control.Monad (forever, when)
-import Data.Foldable (for_)
+import Control.Monad (forever, replicateM_, when)
+import Data.Foldable (for_, traverse_)
 import Data.IORef
+import Data.Maybe (isJust)
+import System.Mem (performMajorGC)
+import System.Mem.Weak (deRefWeak)
 import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck hiding (Failure)
@@ -19,6 +23,7 @@ spec :: Spec
 spec = guarded $ do
   describe "retrying" retries
   describe "every" periods
+  describe "sleepForever" endless
 
 retries :: Spec
 retries = do
@@ -93,6 +98,30 @@ periods = do
     for_ [0, -1, 0 / 0] $ \seconds -> do
       (end, starts) <- timed $ \started -> every seconds started :: Behavior ()
       (end, starts) `shouldBe` (FaultedWith ("every: a period is at least 0.000001 seconds, not " ++ show seconds), [])
+
+endless :: Spec
+endless = do
+  it "does not end, and can be stopped" $ do
+    timed (\started -> timeout 1000000 (started >> sleepForever)) `shouldReturn` (FailedWith "TimedOut 1000000.0", [0])
+    cancelling sleepForever (pure ()) `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+
+  it "is not taken for a deadlock by GHC" $ do
+    let endOfUnreachable :: IO () -> IO () -> (Maybe (Ending ()) -> Bool) -> IO ()
+        endOfUnreachable act looking expected = do
+          end <- newIORef Nothing
+          -- (What has a thread's id keeps GHC from taking it for deadlocked.)
+          thread <- forkIO (ending act >>= writeIORef end . Just) >>= mkWeakThreadId
+          looking
+          readIORef end >>= (`shouldSatisfy` expected)
+          deRefWeak thread >>= traverse_ killThread
+          eventually (isJust <$> readIORef end)
+        collecting n = replicateM_ n (performMajorGC >> yield)
+    endOfUnreachable hang (collecting 10) (== Just (FaultedWith (show BlockedIndefinitelyOnSTM)))
+    endOfUnreachable (sleepForever ||| sleepForever) (collecting 10) (== Nothing)
+
+  it "is a deadlock of a simulation in which nothing else can run, and is named" $ do
+    run <- simulateWith defaultSimOptions (sleepForever ||| sleepForever :: Behavior ())
+    explain (outcome run) `shouldContain` "parallel: right waits for the end of its sleep"
 
 -- | Simulates a behaviour. It is given an action that records the time, and counts from zero.
 timed :: (Behavior Int -> Behavior ()) -> IO (Ending (), [Seconds])

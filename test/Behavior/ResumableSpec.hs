@@ -8,13 +8,18 @@ import Control.Monad (replicateM_, void, when)
 import Data.Foldable (for_)
 import Data.IORef
 import Data.List (group, nub)
+import Data.Map (Map)
+import qualified Data.Map as Map
+import Data.Maybe (fromMaybe)
 import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 
 import Behavior
+import Behavior.Message (handleNext, waiting, withInbox)
 import qualified Behavior.Signal as Signal
 import Behavior.STM
 import Behavior.Sim (Plan, exhaustively, explore, randomly)
+import Behavior.Time (checkpoint)
 import Memory (inConstantMemory)
 import Support hiding (Log)
 
@@ -80,6 +85,43 @@ spec = guarded $ do
     map head (group visited) `shouldBe` nub visited
     visited `shouldBe` [1 .. 300]
 
+  describe "by key" $ do
+    prop "is resumable on what is left for the key, and leaves the others alone" $ \scripts known ->
+      sameAs
+        ( \entries -> do
+            progress <- newTVarIO (maybe id (Map.insert 'a') known (Map.singleton 'b' scripts))
+            end <- ending (void (resumableFor progress 'a' scripts (void . play entries)))
+            left <- readTVarIO progress
+            pure (end, Map.findWithDefault scripts 'a' left, Map.lookup 'b' left)
+        )
+        ( \entries -> do
+            left <- newTVarIO (fromMaybe scripts known)
+            end <- ending (resumable left (void . play entries))
+            rest <- readTVarIO left
+            pure (end, rest, Just scripts)
+        )
+
+    it "removes the key by its transaction, and not before" $ do
+      progress <- newTVarIO (Map.fromList [(2, "x")])
+      forget <- resumableFor progress (1 :: Int) "ab" (\_ -> pure ())
+      readTVarIO progress `shouldReturn` Map.fromList [(1, ""), (2, "x")]
+      atomically forget
+      readTVarIO progress `shouldReturn` Map.fromList [(2, "x")]
+
+    it "no step of an order is repeated, though robots are interrupted and fail, under all schedules" $
+      repeatedStep (exhaustively 2) (\progress n -> resumableFor progress n "abc") `shouldReturn` False
+    it "nor under random schedules" $
+      repeatedStep (randomly 500) (\progress n -> resumableFor progress n "abc") `shouldReturn` False
+    it "one is if the key is removed before the order is done" $ do
+      -- (A simulation interrupts only at operations of the library.)
+      let tooEarly progress n act = pure () <$ (resumableFor progress n "abc" act >>= atomically >> checkpoint)
+      repeatedStep (exhaustively 1) tooEarly `shouldReturn` True
+
+    it "a hundred thousand orders, in constant memory" $ do
+      progress <- newTVarIO Map.empty
+      inConstantMemory 100000 $ \step ->
+        for_ [1 .. 50000 :: Int] $ \n -> resumableFor progress n "ab" (const step) >>= atomically
+
   it "a hundred thousand elements, in constant memory" $
     inConstantMemory 100000 $ \step -> do
       -- (A constant list would be shared, and kept.)
@@ -102,6 +144,30 @@ visitedTwice plan resuming = do
     _ <- simulate' (Signal.monitor (Signal.watching (readTVar low)) recharge (resuming left visit) ||| (drains >> hang))
     places <- readIORef visited
     when (length places > length (nub places)) $ writeIORef found True
+  readIORef found
+
+-- | Whether, in one of the schedules, a step of an order was done twice: by a robot whose battery
+-- becomes low, and which fails once.
+repeatedStep :: Plan -> (TVar (Map Int String) -> Int -> (Char -> Behavior ()) -> Behavior (STM ())) -> IO Bool
+repeatedStep plan carryingOut = do
+  found <- newIORef False
+  _ <- explore plan $ \simulate' -> do
+    progress <- newTVarIO Map.empty
+    low <- newTVarIO False
+    jammed <- newTVarIO True
+    done <- newIORef []
+    let step n c = do
+          sleep 1
+          isJammed <- atomically (swapTVar jammed False)
+          if isJammed then failed else modifyIORef' done ((n, c) :)
+        recharge = atomically (writeTVar low False)
+        drains = for_ [2, 4 :: Seconds] $ \_ -> sleep 2 >> atomically (writeTVar low True)
+        orders deliver = pure () <$ for_ [1, 2] deliver
+        order inbox = attempt 2 (handleNext inbox (\n -> carryingOut progress n (step n)))
+        allOrders inbox = atomically (waiting inbox) >>= \n -> if n == 0 then pure () else order inbox >> allOrders inbox
+    _ <- simulate' (withInbox 5 orders (Signal.monitor (Signal.watching (readTVar low)) recharge . allOrders) ||| (drains >> hang))
+    steps <- readIORef done
+    when (length steps > length (nub steps)) $ writeIORef found True
   readIORef found
 
 -- | The mistake that 'resumable' does not make.

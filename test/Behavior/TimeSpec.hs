@@ -17,6 +17,7 @@ import Test.QuickCheck hiding (Failure, within)
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
 import Behavior.Internal.Seconds (duration, period)
+import qualified Behavior.Signal as Signal
 import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, simulate)
 import Behavior.Time
 import Support
@@ -32,6 +33,7 @@ spec = guarded $ do
       moments `shouldBe` sort moments
   describe "sleep" sleeping
   describe "timeout" timeouts
+  describe "timeoutAt" deadlines
 
 -- | Runs it in a simulation, where no time passes before a behaviour has begun.
 virtually :: Behavior a -> IO a
@@ -74,6 +76,7 @@ lengths = do
   it "is any number where a point in time is required" $ do
     sleepUntil notANumber `shouldThrow` isRefusal "sleepUntil: a point in time is a number, not " notANumber
     sleepUntil (-infinite)
+    timeoutAt notANumber (pure ()) `shouldThrow` isRefusal "timeoutAt: a point in time is a number, not " notANumber
 
   it "must be at least a microsecond where a period is required" $ do
     for_ [0, -1, notANumber, 5e-324, 0.0000009] $ \s ->
@@ -195,3 +198,44 @@ timeouts = do
   it "runs the behaviour in a thread of its own" $ do
     caller <- myThreadId
     timeout 3600 myThreadId >>= (`shouldNotBe` caller)
+
+deadlines :: Spec
+deadlines = do
+  it "is timeout with the time that is left" $
+    for_ [-1, 0, 2.5, 4, infinite] $ \end -> for_ [0, 2.5, 3] $ \begin -> do
+      let at limited = virtually $ do
+            sleep begin
+            how <- try (limited (sleep 2 >> pure 'a'))
+            (,) (how :: Either TimedOut Char) <$> now
+      one <- at (timeoutAt end)
+      other <- at (\act -> now >>= \t -> timeout (max 0 (end - t)) act)
+      (end, begin, one) `shouldBe` (end, begin, other)
+
+  it "does not start the behaviour when the deadline has passed" . void . explore (randomly 100) $ \simulated -> do
+    entries <- newLog
+    _ <- simulated (now >>= \end -> sleep 1 >> for_ [end, end + 1] (\e -> timeoutAt e (note entries 'a') ? pure ()))
+    notes entries `shouldReturn` ""
+
+  it "is kept by a mission that a monitor interrupts and that tries again after pauses, under random schedules" . void . explore (randomly 300) $ \simulated -> do
+    low <- newTVarIO False
+    events <- newLog
+    let record what = now >>= \t -> note events (what, t)
+        charge = record "charge" >> sleep 10 >> atomically (writeTVar low False)
+        try' = record "try" >> sleep 100
+        drains = for_ [7, 40] (\t -> sleepUntil t >> atomically (writeTVar low True)) >> sleepForever
+        mission = do
+          end <- (+ 60) <$> now
+          Signal.monitor (Signal.watching (readTVar low)) charge (timeoutAt end (retrying (iterate (* 2) 1) (timeout 5 try')))
+    _ <- simulated ((drains ||| mission) `fallbackWith` (record . show))
+    -- 5 s for each try, pauses of 1, 2, 4 and 8 s; after each charging from the beginning.
+    notes events
+      `shouldReturn` [ ("try", 0), ("try", 6), ("charge", 7), ("try", 17), ("try", 23), ("try", 30)
+                     , ("try", 39), ("charge", 40), ("try", 50), ("try", 56), ("TimedOut 10.0", 60)
+                     ]
+
+  it "does not start a task again whose deadline passed while the robot recovered" $ do
+    low <- newTVarIO True
+    entries <- newLog
+    let charge = sleep 10 >> atomically (writeTVar low False)
+    virtually (Signal.monitor (Signal.watching (readTVar low)) charge (timeoutAt 5 (note entries "task"))) `shouldThrow` (== TimedOut 0)
+    notes entries `shouldReturn` []

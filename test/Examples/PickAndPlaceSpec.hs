@@ -25,7 +25,7 @@ spec = guarded $ do
   it "takes a position on which two of three detectors agree" $ do
     let located found = fmap ended . simulate $ locate found >>= \position -> when (position /= 2.5) (failWith (show position))
     located [pure 2, Time.sleep 1 >> pure 3, Time.sleep 3600 >> pure 2] `shouldReturn` "returned"
-    located [pure 7, failWith "dark", pure 2] `shouldReturn` "failure: FailedBecause \"no two detectors agree\""
+    located [pure 7, failWith "dark", pure 2] `shouldReturn` "failure: FailedBecause \"no 2 of 3 agree\""
   it "never moves while the gripper moves, and ends parked, whenever it is cancelled" $
     for_ moments $ \moment ->
       survives 30 (day [3, 7] moment mempty pickAndPlace)

@@ -15,8 +15,10 @@ module Behavior.Internal.Parallel
   , firstOf
   , allOf
   , decide
+  , agreeing
   ) where
 
+import Control.Applicative ((<|>))
 import Control.Concurrent.STM (STM, TVar, catchSTM, check, modifyTVar', newTVarIO, readTVar, retry)
 import Control.Exception (ErrorCall (..), SomeException, evaluate, fromException, throwIO)
 import Control.Monad (foldM, join, void, (<=<), (<$!>))
@@ -25,9 +27,10 @@ import Data.Foldable (toList)
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (intercalate)
+import Data.Maybe (isNothing)
 import Data.Traversable (mapAccumL)
 
-import Behavior.Internal.Failure (Behavior, BehaviorFailed, failed)
+import Behavior.Internal.Failure (Behavior, BehaviorFailed, failWith, failed)
 import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
@@ -191,23 +194,7 @@ allOf behaviors = structured "allOf" $ \scope -> do
 -- >>> firstToSucceed [failWith "no satellite", sleep 0.01 >> pure "wheel encoders"]
 -- "wheel encoders"
 --
--- Two of three, or any m of n; it fails as soon as too few are left:
---
--- >>> :{
--- atLeast :: Int -> [Behavior a] -> Behavior [a]
--- atLeast m = decide $ \ends ->
---   let results = take m [a | Just (Right a) <- ends]
---       left = length [() | Nothing <- ends]
---    in if length results == m then Just (pure results)
---       else if length results + left < m then Just (failWith "too few have succeeded")
---       else Nothing
--- :}
---
--- >>> atLeast 2 [pure 1.5, failWith "out of range", pure 1.6]
--- [1.5,1.6]
---
--- >>> atLeast 2 [failWith "out of range", sleep 3600, failWith "no echo"]
--- *** Exception: FailedBecause "too few have succeeded"
+-- Any M of N, and those whose results agree: 'agreeing'.
 --
 -- /Section 2 of the paper: the Parallel node with its thresholds for success and failure./
 --
@@ -237,6 +224,56 @@ decide choose behaviors =
       | otherwise -> chooseAfter ends known
   inOrder known = [IntMap.lookup n known | n <- [1 .. count]]
   count = length behaviors
+
+-- | M of N: starts all behaviours at once, and gives the results of the first @m@ that agree.
+--
+-- > agreeing m agree behaviors
+--
+-- The function says whether two results agree: @(==)@, or for measurements a tolerance. Among the @m@
+-- results each agrees with each. As soon as there are @m@ such results, the other behaviours are
+-- stopped; and also when there cannot be as many any more, because too few still run: then it fails.
+--
+-- > agreeing m (\_ _ -> True)     -- any m that succeed
+-- > agreeing 1 (\_ _ -> True)     -- the first that succeeds
+-- > head <$> agreeing m (==)       -- the value on which m agree
+--
+-- [Result] @m@ results, in the order of their behaviours; if several choices agree, the leftmost. With
+--   @m <= 0@ none, and nothing is started.
+-- [Failure] A 'Behavior.FailedBecause' when no @m@ can agree; with more than there are behaviours,
+--   at once. A behaviour's own failure only makes it one less.
+-- [Fault] The leftmost fault of all, in a cleanup too, is always thrown. What the function throws is
+--   thrown.
+-- [Cancellation] Requests the stop of all together; returns after all have ended.
+--
+-- The search takes time in proportion to the number of pairs, if agreement is an equivalence; with
+-- a tolerance it can take longer: it is meant for a few dozen sensors.
+--
+-- >>> let near a b = abs (a - b) <= (0.5 :: Double)
+-- >>> agreeing 2 near [pure 1.5, pure 9, sleep 0.01 >> pure 1.6, sleep 3600 >> pure 1.5]
+-- [1.5,1.6]
+--
+-- >>> agreeing 2 near [pure 1.5, failWith "no echo", sleep 0.01 >> pure 9]
+-- *** Exception: FailedBecause "no 2 of 3 agree"
+--
+-- /Section 2 of the paper: the Parallel node, with its threshold for success./
+--
+-- @since 0.1.0.0
+agreeing :: Int -> (a -> a -> Bool) -> [Behavior a] -> Behavior [a]
+agreeing m agree behaviors = decide choose behaviors
+ where
+  choose ends
+    | Just results <- among m known = Just (pure results)
+    | isNothing (among (m - running) known) = Just (failWith ("no " ++ show m ++ " of " ++ show (length behaviors) ++ " agree"))
+    | otherwise = Nothing
+   where
+    known = [a | Just (Right a) <- ends]
+    running = length (filter isNothing ends)
+  -- The leftmost n of these results among which each agrees with each.
+  among n results
+    | n <= 0 = Just []
+    | otherwise = case results of
+        a : others | length results >= n -> ((a :) <$> among (n - 1) (filter (agree a) others)) <|> among n others
+        _ -> Nothing
 
 -- | How the branches with these numbers have ended, or the first fault.
 type Ends a = Either (Int, SomeException) (IntMap (Either BehaviorFailed a))

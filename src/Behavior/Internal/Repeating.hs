@@ -1,14 +1,17 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Trying again after a pause, and doing something periodically.
+-- Trying again after a pause, doing something periodically, and never ending.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Repeating
   ( retrying
   , retryingWith
   , every
+  , sleepForever
   ) where
+
+import Control.Monad (forever)
 
 import Behavior.Internal.Failure (Behavior, BehaviorFailed, fallbackWith)
 import Behavior.Internal.Runtime (now, sleep, sleepUntil)
@@ -103,3 +106,20 @@ every seconds act = do
         sleepUntil next
         from next
   now >>= from
+
+-- | A behaviour that never ends by itself: it waits until it is cancelled. It uses no processor time.
+--
+-- > sleepForever  =  forever (sleep (1 / 0))
+--
+-- What runs until something else ends it, as a branch or a task that only its operator stops. (With
+-- @atomically retry@ GHC may take the thread for deadlocked, and throw
+-- 'Control.Exception.BlockedIndefinitelyOnSTM' to it and to those that wait for it. This it never
+-- takes for that.) A simulation in which nothing else can ever run again ends with a deadlock, which
+-- names it as waiting for the end of its sleep; with "Behavior.Sim"'s @endingAt@ it ends then.
+--
+-- >>> sleepForever ||| putStrLn "beep"
+-- beep
+--
+-- @since 0.1.0.0
+sleepForever :: Behavior a
+sleepForever = forever (sleepUntil (1 / 0))

@@ -5,10 +5,16 @@
 -- Going on after an interruption where it was.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Internal.Resumable (resumable) where
+module Behavior.Internal.Resumable
+  ( resumable
+  , resumableFor
+  ) where
 
-import Control.Concurrent.STM (TVar, modifyTVar, readTVar)
+import Control.Concurrent.STM (STM, TVar, modifyTVar, readTVar)
 import Control.Exception (mask)
+import Data.Map.Lazy (Map)
+import qualified Data.Map.Lazy as Map
+import Data.Maybe (fromMaybe)
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime (atomically)
@@ -16,7 +22,9 @@ import Behavior.Internal.Runtime (atomically)
 -- $setup
 -- >>> import Behavior
 -- >>> import Behavior.STM
+-- >>> import Behavior.Message
 -- >>> import qualified Behavior.Signal as Signal
+-- >>> import qualified Data.Map as Map
 
 -- | Runs a behaviour for each element of the list in a variable, and removes the element when the
 -- behaviour has returned. After an interruption, call it again with the same variable: it goes on
@@ -58,10 +66,57 @@ import Behavior.Internal.Runtime (atomically)
 --
 -- @since 0.1.0.0
 resumable :: TVar [a] -> (a -> Behavior ()) -> Behavior ()
-resumable left act =
-  atomically (readTVar left) >>= \case
-    [] -> pure ()
-    next : _ -> do
-      -- Masked, so that nothing comes between its return and the commit, which forces nothing.
-      mask $ \restore -> restore (act next) >> atomically (modifyTVar left (drop 1))
-      resumable left act
+resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
+
+-- | 'resumable' with the progress kept by key: of each order, say, the steps that are left.
+--
+-- > resumableFor progress key steps act
+-- >   -- as resumable on a variable that holds steps at first, and that is found by its key
+--
+-- A key that is not in the map has all the steps left; one that is there goes on where it was,
+-- whichever robot works on it now, and whatever came in between: an interruption, a failure and a retry.
+-- A key stays in the map, also when nothing is left for it, until the transaction that is returned
+-- has removed it. Commit that together with what says that the whole is done: then neither is repeated,
+-- whatever interrupts it in between.
+--
+-- > handleNext orders (\order -> resumableFor progress (number order) (steps order) carryOut)
+-- > resumableFor progress key steps act >>= atomically     -- if nothing else says so
+--
+-- [Result] A transaction that removes the key.
+-- [Failure, fault, cancellation] As in 'resumable', which also says how to have an effect only once.
+--
+-- Two behaviours must not work on one key at the same time. The steps that are given are looked at
+-- only while the key is not in the map.
+--
+-- >>> progress <- newTVarIO (Map.empty :: Map.Map Int [String])
+-- >>> tries <- newTVarIO (0 :: Int)
+-- >>> let jammed = atomically (modifyTVar' tries (+ 1) >> (< 2) <$> readTVar tries)
+-- >>> let step name = putStrLn name >> if name == "lift" then jammed >>= \is -> if is then failed else pure () else pure ()
+-- >>> let orders deliver = pure () <$ deliver 7
+-- >>> withInbox 5 orders $ \inbox -> attempt 2 (handleNext inbox (\n -> resumableFor progress n ["fetch", "lift", "bring"] step))
+-- fetch
+-- lift
+-- lift
+-- bring
+-- >>> Map.null <$> readTVarIO progress
+-- True
+--
+-- @since 0.1.0.0
+resumableFor :: Ord k => TVar (Map k [a]) -> k -> [a] -> (a -> Behavior ()) -> Behavior (STM ())
+resumableFor progress key steps act = modifyTVar progress (Map.delete key) <$ goOn left drop1 act
+ where
+  left = Map.findWithDefault steps key <$> readTVar progress
+  drop1 = modifyTVar progress (Map.alter (Just . drop 1 . fromMaybe steps) key)
+
+-- | Runs the behaviour for each element that is left, and removes it. The transactions read what is
+-- left, and remove the first element.
+goOn :: STM [a] -> STM () -> (a -> Behavior ()) -> Behavior ()
+goOn left removeFirst act = again
+ where
+  again =
+    atomically left >>= \case
+      [] -> pure ()
+      next : _ -> do
+        -- Masked, so that nothing comes between its return and the commit, which forces nothing.
+        mask $ \restore -> restore (act next) >> atomically removeFirst
+        again

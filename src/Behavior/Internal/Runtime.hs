@@ -345,9 +345,7 @@ sleep seconds = do
 -- > sleep s  =  now >>= \t -> sleepUntil (t + s)
 --
 -- With an infinite number it sleeps until it is cancelled. NaN is refused with an 'ErrorCall' (a
--- fault). A deadline for a mission, if @t@ is its time:
---
--- > now >>= \started -> timeout (max 0 (t - started)) mission
+-- fault). A deadline for a behaviour is 'Behavior.Time.timeoutAt'.
 --
 -- >>> started <- now
 -- >>> sleepUntil (started + 0.001)

@@ -7,6 +7,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Reactive.Timeout
   ( timeout
+  , timeoutAt
   , TimedOut (..)
   , cleanupWithin
   ) where
@@ -21,11 +22,12 @@ import Behavior.Internal.Failure
   )
 import Behavior.Internal.Reactive.Engine (Reaction (..), react)
 import Behavior.Internal.Runtime (atomically, now, sleepUntil)
-import Behavior.Internal.Seconds (Seconds, duration)
+import Behavior.Internal.Seconds (Seconds, duration, moment)
 import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), constantView, fromView)
 
 -- $setup
 -- >>> import Behavior (sleep, (?))
+-- >>> import Behavior.Time (now)
 -- >>> import Control.Exception (onException)
 
 -- | Runs the behaviour for at most the given number of seconds, and fails with 'TimedOut'
@@ -54,6 +56,41 @@ timeout :: Seconds -> Behavior a -> Behavior a
 timeout seconds behavior = do
   limit <- duration "timeout" seconds
   react "timeout" (elapsed limit) $ \case
+    True -> TimeIsUp limit (throwIO (TimedOut limit))
+    False -> Run "branch" behavior
+
+-- | 'timeout' with a deadline, a moment on the clock of 'Behavior.Time.now', in place of a duration.
+--
+-- > timeoutAt end act  =  now >>= \t -> timeout (max 0 (end - t)) act
+--
+-- The deadline is the same however often the behaviour begins again: so a mission has its limit in
+-- total, its recoveries included, and within that each try has one of its own, with growing pauses in
+-- between:
+--
+-- > do end <- (+ 60) <$> now
+-- >    monitor low charge (timeoutAt end (retrying (iterate (* 2) 1) (timeout 5 deliver)))
+--
+-- (The monitor interrupts what has the limit, and so a recovery is not cut short. A @timeout 60@ in its
+-- place would begin again with the task.)
+--
+-- [Result, failure, fault, cancellation] As in 'timeout'. 'TimedOut' has the number of seconds from its
+--   start to the deadline.
+--
+-- When the deadline has passed, the behaviour is not started. NaN is refused with an
+-- 'Control.Exception.ErrorCall' (a fault); an infinite deadline is none.
+--
+-- >>> end <- (+ 0.01) <$> now
+-- >>> timeoutAt end (sleep 3600) ? putStrLn "never mind"
+-- never mind
+-- >>> timeoutAt end (putStrLn "once more")
+-- *** Exception: TimedOut 0.0
+--
+-- @since 0.1.0.0
+timeoutAt :: Seconds -> Behavior a -> Behavior a
+timeoutAt seconds behavior = do
+  end <- moment "timeoutAt" seconds
+  limit <- (\t -> max 0 (end - t)) <$> now
+  react "timeoutAt" (reached end limit) $ \case
     True -> TimeIsUp limit (throwIO (TimedOut limit))
     False -> Run "branch" behavior
 
@@ -102,8 +139,13 @@ cleanupWithin seconds behavior = uninterruptibleMask_ $ do
 
 -- | False until the given number of seconds has passed since the signal was opened.
 elapsed :: Seconds -> Signal Bool
-elapsed seconds = Signal $ \_ -> do
-  over <- newTVarIO (seconds <= 0)
+elapsed seconds = Signal $ \demand -> do
   deadline <- (+ seconds) <$> now
+  open (reached deadline seconds) demand
+
+-- | False until that moment. The second number is how many seconds are left.
+reached :: Seconds -> Seconds -> Signal Bool
+reached deadline left = Signal $ \_ -> do
+  over <- newTVarIO (left <= 0)
   let clock = sleepUntil deadline >> atomically (writeTVar over True)
   pure (fromView (pure (constantView (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]}

@@ -25,7 +25,10 @@ import Behavior.Internal.Trace.Decision (Reading)
 
 -- $setup
 -- >>> import Behavior
+-- >>> import Behavior.Sim (simulate)
 -- >>> import qualified Behavior.Signal as Signal
+-- >>> import Behavior.STM (atomically, newTVarIO, readTVar, writeTVar)
+-- >>> import Behavior.Time (sleepForever)
 
 -- | A change counts only once it has lasted for the given number of seconds (zero or more);
 -- until then the signal keeps its value. Its first value counts at once, and so
@@ -161,10 +164,19 @@ olderThan seconds signal = Signal $ \demand -> do
 --
 -- @low@ must not be above @high@, and neither may be NaN (otherwise an 'ErrorCall' is thrown).
 --
--- >>> let level = pure 50 :: Signal Int
--- >>> let charged = Signal.hysteresis True 20 80 level
--- >>> Signal.rSelect charged (pure "work") (pure "charge")
--- "work"
+-- True is the side of the /high/ values. A battery that is low from 20 % down, and until it has 80 %,
+-- is therefore the negation, @initial@ included:
+--
+-- > low = not \<$> Signal.hysteresis True 20 80 level     -- not: Signal.hysteresis False 20 80 level
+--
+-- >>> battery <- newTVarIO (50 :: Int)
+-- >>> let low = not <$> Signal.hysteresis True 20 80 (Signal.watching (readTVar battery))
+-- >>> let shown = Signal.switch low (\isLow -> putStrLn (if isLow then "low" else "not low") >> sleepForever)
+-- >>> let levels = sequence_ [sleep 1 >> atomically (writeTVar battery n) | n <- [21, 20, 79, 80, 21]]
+-- >>> _ <- simulate (levels ||| shown)
+-- not low
+-- low
+-- not low
 --
 -- @since 0.1.0.0
 hysteresis :: Ord a => Bool -> a -> a -> Signal a -> Signal Bool
@@ -182,7 +194,6 @@ hysteresis initial low high signal = Signal $ \demand -> do
 -- (as during a recovery) is one change, or none. Like the memory of 'hysteresis', the count lasts for
 -- the operator's whole run.
 --
--- >>> import Behavior.STM (newTVarIO, readTVar, writeTVar)
 -- >>> goal <- newTVarIO "kitchen"
 -- >>> let next = sleep 0.01 >> atomically (writeTVar goal "garden")
 -- >>> Signal.waitUntil ((> 0) <$> Signal.changes (Signal.watching (readTVar goal))) `both` next

@@ -1,0 +1,129 @@
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- Behaviours that wait while a condition holds.
+module Behavior.PausingSpec (spec) where
+
+import Control.Concurrent.STM (newTVarIO, readTVarIO, writeTVar)
+import Control.Exception
+import Control.Monad (void)
+import Data.Foldable (for_)
+import Data.IORef
+import Test.Hspec
+
+import Behavior
+import Behavior.Sim (exhaustively, explain, explore, outcome, randomly, simulate)
+import Behavior.Signal (Signal, pausedWhile, stoppedWhile, teleoReactive)
+import Behavior.Time (atomically, now, sleepUntil, timeout)
+import Support
+import Watched
+
+spec :: Spec
+spec = guarded $ do
+  describe "pausedWhile" pauses
+  describe "stoppedWhile" stops
+
+pauses :: Spec
+pauses = do
+  it "pauses and resumes whenever the condition changes, and does not stop the behaviour" $ do
+    told <- story [(2.5, True), (5, False), (6.5, True), (7, False)] $ \condition record ->
+      pausedWhile condition (record "pause") (record "resume") (for_ ["a", "b", "c"] (\leg -> record leg >> sleep 3))
+    told `shouldBe` [("a", 0), ("pause", 2.5), ("b", 3), ("resume", 5), ("c", 6), ("pause", 6.5), ("resume", 7), ("Gave ()", 9)]
+
+  it "does not begin while the condition holds, and does not pause what has not begun" $ do
+    told <- story [(0, True), (2, False)] $ \condition record ->
+      sleep 1 >> pausedWhile condition (record "pause") (record "resume") (record "begin" >> sleep 1)
+    told `shouldBe` [("begin", 2), ("Gave ()", 3)]
+
+  it "stops a pause that is no longer needed, and then resumes" $ do
+    told <- story [(1, True), (2, False)] $ \condition record ->
+      pausedWhile condition (record "pause" >> sleep 9 >> record "paused") (record "resume") (sleep 5)
+    told `shouldBe` [("pause", 1), ("resume", 2), ("Gave ()", 5)]
+
+  it "resumes when the behaviour ends while it is paused, and gives its result" $ do
+    told <- story [(1, True)] $ \condition record ->
+      pausedWhile condition (record "pause") (sleep 1 >> record "resume") (sleep 5)
+    told `shouldBe` [("pause", 1), ("resume", 6), ("Gave ()", 6)]
+
+  it "resumes beside the cleanup of the behaviour when it is cancelled" $ do
+    told <- story [(1, True)] $ \condition record ->
+      timeout 2 (pausedWhile condition (record "pause") (record "resume") (sleep 9 `onException` uninterruptibleMask_ (sleep 1 >> record "cleaned up"))) ? pure ()
+    told `shouldBe` [("pause", 1), ("resume", 2), ("cleaned up", 3), ("Gave ()", 3)]
+
+  it "stops the behaviour, and throws, when pausing or resuming fails or faults" $
+    for_ [(failWith "no", FailedWith "FailedBecause \"no\""), (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())] $ \(wrong, end) -> do
+      let act record = sleep 9 `onException` record "stopped"
+      one <- story [(1, True), (2, False)] $ \condition record -> pausedWhile condition wrong (record "resume") (act record)
+      one `shouldBe` [("resume", 1), ("stopped", 1), (show end, 1)]
+      other <- story [(1, True), (2, False)] $ \condition record -> pausedWhile condition (record "pause") wrong (act record)
+      other `shouldBe` [("pause", 1), ("stopped", 2), (show end, 2)]
+
+  it "ignores a failure of resuming after the end of the behaviour, and throws a fault of it" $
+    for_ [(failWith "no", Gave ()), (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())] $ \(wrong, end) -> do
+      told <- story [(1, True)] $ \condition record -> pausedWhile condition (record "pause") wrong (sleep 5)
+      told `shouldBe` [("pause", 1), (show end, 5)]
+
+  it "stops the behaviour when the condition fails, faults or has no value any more" $
+    for_ [SensorFailure, SensorFault, NoValue] $ \dead -> do
+      condition <- newTestCondition False
+      stopped <- newTVarIO False
+      run <- simulate (pausedWhile (watched condition) (pure ()) (pure ()) (sleep 9 `onException` atomically (writeTVar stopped True)) `both` (sleep 1 >> set condition dead))
+      explain (outcome run) `shouldNotContain` "returned"
+      readTVarIO stopped `shouldReturn` True
+
+  it "pauses and resumes in turn, and leaves nothing paused, under random schedules" $ do
+    inTurn 500 4 [True, False, True, False, True]
+    inTurn 500 2 [True, False]
+
+stops :: Spec
+stops = do
+  it "stops the behaviour while the condition holds, and begins it again" $ do
+    told <- story [(2, True), (5, False)] $ \condition record ->
+      stoppedWhile condition ((record "begin" >> sleep 3) `onException` record "stopped")
+    told `shouldBe` [("begin", 0), ("stopped", 2), ("begin", 5), ("Gave ()", 8)]
+
+  it "waits at first if the condition holds" $ do
+    told <- story [(0, True), (2, False)] $ \condition record -> sleep 1 >> stoppedWhile condition (record "begin")
+    told `shouldBe` [("begin", 2), ("Gave ()", 2)]
+
+  it "is teleoReactive with one rule: the same happens under all schedules" $ do
+    one <- stories stoppedWhile
+    other <- stories (\condition act -> teleoReactive [(not <$> condition, act)])
+    one `shouldBe` other
+ where
+  stories stopping = do
+    found <- newIORef []
+    _ <- explore (exhaustively 1) $ \simulate' -> do
+      entries <- newLog
+      var <- newTVarIO False
+      let changes = for_ [True, False, True, False] (\v -> sleep 1 >> atomically (writeTVar var v))
+      run <- simulate' (both changes (stopping (watchedVar var) ((note entries "begin" >> sleep 2) `onException` note entries "stopped")))
+      all' <- notes entries
+      modifyIORef' found ((explain (outcome run), all') :)
+    readIORef found
+
+-- | What happened, and when, in a simulation with a condition that changes at these times, and is
+-- false before.
+story :: [(Seconds, Bool)] -> (Signal Bool -> (String -> Behavior ()) -> Behavior ()) -> IO [(String, Seconds)]
+story changes act = do
+  var <- newTVarIO False
+  entries <- newLog
+  let record what = now >>= \t -> note entries (what, t)
+      scripted = for_ changes (\(t, v) -> sleepUntil t >> atomically (writeTVar var v))
+  _ <- simulate (scripted `both` (ending (act (watchedVar var) record) >>= record . show))
+  notes entries
+
+-- | A driver that is paused and resumed, each in two steps, and a behaviour that ends, or is stopped
+-- after the given time: pausing and resuming never overlap, and at the end the driver is not paused.
+inTurn :: Int -> Seconds -> [Bool] -> IO ()
+inTurn count limit changes = void . explore (randomly count) $ \simulate' -> do
+  near <- newTVarIO False
+  paused <- newTVarIO False
+  counter <- newOccupancyCounter
+  let pause = inside counter (atomically (writeTVar paused True) >> sleep 0.5)
+      resume = inside counter (sleep 0.25 >> atomically (writeTVar paused False))
+      person = for_ changes (\is -> sleep 1 >> atomically (writeTVar near is))
+      step = pausedWhile (watchedVar near) pause resume (sleep 2.5)
+  _ <- simulate' (both person (timeout limit (step >> step) ? pure ()))
+  mostInside counter >>= (`shouldSatisfy` (<= 1))
+  readTVarIO paused `shouldReturn` False
