@@ -19,7 +19,7 @@ import System.Exit (die)
 import System.Mem (performMajorGC)
 
 import Behavior
-import Behavior.Parallel (allOf, decide, firstOf)
+import Behavior.Parallel (allOf, await, decide, firstOf, fork, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (atomically)
 import Behavior.Trace (Sink (..), TraceOptions (..), defaultTraceOptions, named, withTrace, withTraceOptions)
@@ -139,6 +139,7 @@ many waits =
       , about n "firstOf, the last ends" (\size -> firstOf (take (size - 1) waits ++ [succeeds]))
       , about n "allOf" (\size -> void (allOf (replicate size succeeds)))
       , about n "decide" (\size -> decide (\ends -> pure () <$ sequence ends) (replicate size succeeds))
+      , about n "scoped, older children end" (olderEnd waits)
       , about n "bare threads, stopped" (stopping . (`take` waits))
       ]
     | n <- [2, 10, 100, 1000]
@@ -159,6 +160,19 @@ about :: Int -> String -> (Int -> Behavior ()) -> Case
 about n name act = Case (name ++ " " ++ show n) (21000 `div` n * 2) (\times -> mapM_ act (take times (cycle sizes)))
  where
   sizes = [n - n `div` 10, n - n `div` 10 + max 1 (n `div` 100) .. n + n `div` 10]
+
+-- | Half the given number of children end while as many newer ones wait; then as many are forked, one
+-- after the other.
+olderEnd :: [Behavior ()] -> Int -> Behavior ()
+olderEnd waits size = scoped $ \nursery -> do
+  begin <- newTVarIO False
+  old <- replicateM half (fork nursery (atomically (readTVar begin >>= STM.check)))
+  mapM_ (fork nursery) (take half waits)
+  atomically (writeTVar begin True)
+  mapM_ (atomically . await) old
+  replicateM_ half (fork nursery succeeds >>= atomically . await)
+ where
+  half = size `div` 2
 
 -- | The lower bound of 'firstOf': threads that are started, wait, and are stopped.
 stopping :: [Behavior ()] -> Behavior ()

@@ -15,6 +15,7 @@ import qualified NurseryRaces
 import qualified ReactiveThrow
 import qualified SimBusy
 import qualified SimEnds
+import qualified ScopedScale
 import qualified SharedFilters
 import qualified SimGhc
 import qualified SimReality
@@ -48,6 +49,7 @@ attacks =
   , ("ReactiveThrow", ReactiveThrow.attack)
   , ("SimBusy", SimBusy.attack)
   , ("SimEnds", SimEnds.attack)
+  , ("ScopedScale", ScopedScale.attack)
   , ("SharedFilters", SharedFilters.attack)
   , ("SimGhc", SimGhc.attack)
   , ("SimReality", SimReality.attack)

@@ -88,6 +88,9 @@ instance Exception ChildStopped where
 --   in the order in which they were forked), in a cleanup too, is always thrown.
 -- [Cancellation] Requests the stop of all together; returns after all have ended.
 --
+-- A child costs the same, however many there are. Of those that have ended, it keeps at most twice as
+-- many as ran at the same time, or 16.
+--
 -- >>> :{
 -- scoped $ \nursery -> do
 --   picture <- fork nursery (pure "a picture of the room")
