@@ -1,5 +1,5 @@
 -- |
--- Work that grows with the number of branches, or of filters, and not with its square.
+-- Work that grows with the number of branches, traces or filters, and not with its square.
 module Behavior.ScaleSpec (spec) where
 
 import Control.Monad (replicateM, replicateM_)
@@ -9,9 +9,10 @@ import System.Mem (performMajorGC)
 import Test.Hspec
 
 import Behavior
-import Behavior.Parallel (await, fork, scoped)
+import Behavior.Parallel (allOf, await, fork, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.STM (atomically, check, modifyTVar', newTVarIO, readTVar, writeTVar)
+import Behavior.Trace (withTrace)
 import Memory (allocatedBy)
 import Support
 
@@ -20,6 +21,12 @@ import Support
 spec :: Spec
 spec = around_ (within 60 . leavingNothing . onOneCapability) $ do
   describe "A scoped behaviour works in proportion to" children
+  it "Traces at the same time cost in proportion to their number" $
+    (1000, 2000) `takesAtMost` 2.5 $ \n -> allocatedBy $ do
+      end <- newGate
+      begun <- newTVarIO 0
+      let traced = withTrace [] (atomically (modifyTVar' begun (+ 1)) >> pass end)
+      allOf (replicate n traced) `both` (atomically (readTVar begun >>= check . (== n)) >> open end)
   describe "Eight filters in each other work for a change at most eight times as much as one:" filters
 
 children :: Spec

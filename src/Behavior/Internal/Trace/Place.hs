@@ -36,7 +36,8 @@ import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef, writeIORef)
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (intercalate)
-import Data.Maybe (listToMaybe)
+import Data.Map.Strict (Map)
+import qualified Data.Map.Strict as Map
 import Data.Unique (Unique, newUnique)
 import GHC.Arr (Array, listArray, unsafeAt)
 import System.IO.Unsafe (unsafePerformIO)
@@ -171,22 +172,22 @@ shards = unsafePerformIO (listArray (0, shardCount - 1) <$> mapM (const (newIORe
 shardCount :: Int
 shardCount = 64
 
--- | The traces that are being made, the newest first. (Those of simulations do not belong to them.)
-liveTraces :: IORef [(Unique, Trace)]
-liveTraces = unsafePerformIO (newIORef [])
+-- | The traces that are being made, the newest last. (Those of simulations do not belong to them.)
+liveTraces :: IORef (Map Unique Trace)
+liveTraces = unsafePerformIO (newIORef Map.empty)
 {-# NOINLINE liveTraces #-}
 
 -- | The trace that began last, of those that are being made.
 newestTrace :: IO (Maybe Trace)
-newestTrace = fmap snd . listToMaybe <$> readIORef liveTraces
+newestTrace = fmap snd . Map.lookupMax <$> readIORef liveTraces
 
 -- | While the action runs, the trace is being made.
 withLiveTrace :: Trace -> IO a -> IO a
 withLiveTrace t act = do
   this <- newUnique
   bracket_
-    (change ((this, t) :) >> add traces 1)
-    (add traces (-1) >> change (filter ((/= this) . fst)))
+    (change (Map.insert this t) >> add traces 1)
+    (add traces (-1) >> change (Map.delete this))
     act
  where
   change f = atomicModifyIORef' liveTraces (\known -> (f known, ()))
