@@ -3,6 +3,7 @@
 module Trace.SinkSpec (spec) where
 
 import Control.Concurrent.MVar
+import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception
 import Control.Monad (replicateM_, when)
 import Data.Foldable (for_)
@@ -12,8 +13,10 @@ import Test.Hspec
 
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
+import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (..), defaultSimOptions, explain, outcome, simulateWith)
 import qualified Behavior.Sim as Sim
+import Behavior.Time (atomically)
 import Behavior.Trace
 import Support hiding (End, Ending (..), Failure, ThreadEvent (..))
 
@@ -48,6 +51,17 @@ receiving = do
     map (take 5) (take 1 found) `shouldBe` ["long "]
     map length (take 1 found) `shouldSatisfy` all (< 20000)
     drop 1 found `shouldBe` ["<its text throws an exception>"]
+
+  it "receives a reaction, whatever the names of its signals and the texts of their values are" $
+    for_ [(throw (Fault "no text"), "<its text"), ('a' : throw (Fault "no text"), "a<its text"), (cycle "ab", "abab")] $ \(text, expected) -> do
+      seen <- newIORef []
+      held <- newTVarIO True
+      let finger = Signal.namedWith text (const text) (Signal.watching (readTVar held))
+          letGo = (\left right -> not (left && right)) <$> finger <*> finger
+      withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] $
+        Signal.insteadWhen letGo (pure ()) (atomically (writeTVar held False) >> hang)
+      found <- readIORef seen
+      [map (take (length expected)) [changeSignal c, changeAfter c] | Reacted r <- found, c <- reactionChanges r] `shouldBe` [[expected, expected]]
 
   it "receives the number of those that it lost, in their place: accepted and lost are all" $ do
     (received, lost) <- counting

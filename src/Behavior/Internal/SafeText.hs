@@ -1,4 +1,5 @@
 {-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
 -- Texts that the user's code computes.
@@ -6,9 +7,10 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.SafeText
   ( safeShow
+  , settledText
   ) where
 
-import Control.Exception (SomeException, evaluate, throwIO, try)
+import Control.Exception (SomeException, catch, evaluate, throwIO, try)
 import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior.Internal.Failure (isCancellation)
@@ -25,3 +27,17 @@ safeShow text = case unsafePerformIO (try (evaluate text) >>= either failing pur
   failing e
     | isCancellation e = throwIO (e :: SomeException)
     | otherwise = pure "<its text throws an exception>"
+
+-- | The text, wholly evaluated, and cut if it is long: whatever the user's code does, it can be compared and
+-- written. What computing it throws is named, as by 'safeShow'.
+settledText :: String -> String
+settledText text = unsafePerformIO (whole text `catch` \(_ :: SomeException) -> whole (safeShow text))
+ where
+  whole t = let cut = limited t in evaluate (foldr seq cut cut)
+  limited t = case splitAt textLimit t of
+    (_, []) -> t
+    (beginning, _) -> beginning ++ " ..."
+
+-- | Longer texts are cut.
+textLimit :: Int
+textLimit = 10000

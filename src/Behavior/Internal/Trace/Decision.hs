@@ -31,6 +31,7 @@ import Data.List (mapAccumL, nub)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
 
+import Behavior.Internal.SafeText (settledText)
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Stop (endOf)
 import Behavior.Internal.Trace.Event
@@ -93,7 +94,8 @@ decide here operator branch before after = do
 
 -- | What the values were before, and are now. (Several signals may have the same name: then the first
 -- belongs to the first, and so on.) Of ordered rules, those whose conditions have changed, up to the first rule
--- that holds now: the ones after it decide nothing.
+-- that holds now: the ones after it decide nothing. (The texts are users', and compared here: so they are settled
+-- first. A sink's thread does that.)
 changesBetween :: Values -> Values -> [Change]
 changesBetween before after =
   nub [Change (readingName r) (readingText <$> Map.lookup key was) (readingText r) | (key, r) <- numbered after, decides (Map.lookup key was) r]
@@ -101,7 +103,8 @@ changesBetween before after =
   was = Map.fromList (numbered before)
   decides old r = maybe True (\(n, _) -> (old >>= readingRule) /= readingRule r && n <= firstHolding) (readingRule r)
   firstHolding = minimum (maxBound : [n | Reading {readingRule = Just (n, True)} <- after])
-  numbered = snd . mapAccumL number Map.empty
+  numbered = snd . mapAccumL number Map.empty . map settled
+  settled r = r {readingName = settledText (readingName r), readingText = settledText (readingText r)}
   number seen r =
     let n = Map.findWithDefault (0 :: Int) (readingName r) seen
      in (Map.insert (readingName r) (n + 1) seen, ((readingName r, n), r))

@@ -35,7 +35,7 @@ import System.Timeout (timeout)
 
 import Behavior.Internal.Runtime.Counter (add, threads)
 import Behavior.Internal.Runtime.OsSleep (osSleep)
-import Behavior.Internal.SafeText (safeShow)
+import Behavior.Internal.SafeText (safeShow, settledText)
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Trace.Event
 import Behavior.Internal.Trace.Place (inPlace, newTrace, top)
@@ -155,16 +155,7 @@ drain running destination = do
 
 -- | The event with all its texts evaluated: users' code computes them.
 settled :: Event -> IO Event
-settled = traverseTexts $ \text -> whole text `catch` \(_ :: SomeException) -> whole (safeShow text)
- where
-  whole text = let cut = limited text in evaluate (foldr seq cut cut)
-  limited text = case splitAt textLimit text of
-    (_, []) -> text
-    (beginning, _) -> beginning ++ " ..."
-
--- | Longer texts are cut.
-textLimit :: Int
-textLimit = 10000
+settled = traverseTexts (evaluate . settledText)
 
 -- | Accepts no more events.
 close :: Running -> IO ()
