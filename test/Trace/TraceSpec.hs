@@ -4,7 +4,7 @@
 -- Traces on real threads: names, parents, causes, and paths of failures.
 module Trace.TraceSpec (spec) where
 
-import Control.Concurrent (forkIO, yield)
+import Control.Concurrent (forkIO, myThreadId, yield)
 import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception
 import Control.Monad (void)
@@ -17,7 +17,7 @@ import Test.Hspec
 
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
-import Behavior.Internal.Trace.Place (Place (trace), Receiver (..), inPlace, myPlace, withReceiver)
+import Behavior.Internal.Trace.Place (Place (trace), Receiver (..), Trace (traceClock), inPlace, myPlace, withReceiver)
 import Behavior.Internal.Trace.Span (abandonableIn)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
 import qualified Behavior.Signal as Signal
@@ -207,6 +207,12 @@ causes = do
   untilStopped child = atomically (void (tryAwait child >>= maybe retry pure))
   cancelledFrom begun act = try (cancellingSelf (pass begun) act) >>= either (\(Cancel _) -> pure ()) pure
 
+-- | Runs the behaviour in a trace that was changed, with this receiver.
+receivedBy :: (Trace -> Trace) -> (Event -> IO ()) -> Behavior a -> Behavior a
+receivedBy change receive act = withTrace [] $ do
+  place <- myPlace >>= maybe (throwIO (Fault "there is no trace")) pure
+  mask $ \restore -> inPlace (Just place {trace = withReceiver (Receiver 1 False receive) (change (trace place))}) (restore act)
+
 reactions :: Spec
 reactions = do
   it "says what was stopped, after how long, and what it started" $ do
@@ -224,6 +230,26 @@ reactions = do
                  ]
     [spanReaction s | Began s <- seen, spanName s == "recharge"] `shouldBe` map (Just . reactionNumber) (take 1 found)
     [reactionParent r | r <- found] `shouldBe` [Inside n | _ <- found, Began s <- seen, spanName s == "mission", let n = spanNumber s]
+
+  it "reaches all receivers, whatever interrupts the operator: they are called masked" $ do
+    states <- newIORef []
+    low <- newTVarIO False
+    receivedBy id (const (getMaskingState >>= \state -> modifyIORef' states (state :))) $
+      Signal.insteadWhen (Signal.watching (readTVar low)) (named "land" (pure ())) (named "fly" (atomically (writeTVar low True) >> hang))
+    length <$> readIORef states `shouldReturn` 5
+    readIORef states >>= (`shouldSatisfy` notElem Unmasked)
+
+  it "is reported, although the operator is cancelled when the branch has just stopped" $ do
+    stopped <- newIORef False
+    seen <- newIORef []
+    low <- newTVarIO False
+    -- The clock is read by the operator, before it stops the branch and after that.
+    let clock = readIORef stopped >>= \is -> if is then myThreadId >>= (`throwTo` Cancel "caller") else pure ()
+        fly = (atomically (writeTVar low True) >> hang) `finally` writeIORef stopped True
+    receivedBy (\t -> t {traceClock = 0 <$ clock}) (\event -> modifyIORef' seen (event :)) (Signal.insteadWhen (Signal.watching (readTVar low)) (pure ()) fly)
+      `shouldThrow` (== Cancel "caller")
+    found <- readIORef seen
+    [reactionOperator r | Reacted r <- found] `shouldBe` ["insteadWhen"]
 
   it "is not reported when an operator only begins" $ do
     (_, seen) <- traceOf (Signal.monitor (pure False) (pure ()) (pure ()) >> Signal.rSelect (pure True) (pure ()) (pure ()))

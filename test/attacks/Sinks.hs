@@ -21,6 +21,8 @@ import System.Posix.Process (exitImmediately)
 
 import Attack
 import Behavior
+import qualified Behavior.Signal as Signal
+import Behavior.STM (atomically, newTVarIO, readTVar, writeTVar)
 import Behavior.Trace
 
 attack :: IO ()
@@ -29,6 +31,7 @@ attack = do
   throwing
   ending
   reentrant
+  interrupted
   bounded
   fullPipe
 
@@ -144,6 +147,39 @@ reentrant = do
   (_, reports) <- reportsOf (withTrace [sink] (replicateM_ 10 (named "x" (threadDelay 5000))))
   n <- readIORef count
   promise ("a sink that uses names received " ++ show n ++ " of 20 events; " ++ show reports) (n == 20 && null reports)
+
+-- | An operator is cancelled while it reports a reaction to four hundred sinks that wait to be woken. All of them
+-- receive it or none does, and each is awake for what comes afterwards.
+interrupted :: IO ()
+interrupted = forM_ [1 .. 150 :: Int] $ \k -> do
+  reacted <- newIORef (0 :: Int)
+  marked <- newIORef (0 :: Int)
+  let sink = EachEvent $ \case
+        Reacted _ -> count reacted
+        Began _ -> count marked
+        _ -> pure ()
+      count r = atomicModifyIORef' r (\n -> (n + 1, ()))
+      spin end = getMonotonicTime >>= \t -> when (t < end) (yield >> spin end)
+      awake n = readIORef marked >>= \m -> unless (m == sinks) $ do
+        when (n == (0 :: Int)) . void $ broken ("interrupted, " ++ show k ++ ": of " ++ show sinks ++ " sinks " ++ show (sinks - m) ++ " are not woken")
+        threadDelay 1000 >> awake (n - 1)
+  withTrace (replicate sinks sink) $ do
+    flag <- newTVarIO False
+    over <- newEmptyMVar
+    here <- adopt
+    thread <- forkIO ((try (here (Signal.waitUntil (Signal.watching (readTVar flag)))) :: IO (Either SomeException ())) >>= putMVar over)
+    -- Until all of them sleep.
+    threadDelay 15000
+    began <- getMonotonicTime
+    atomically (writeTVar flag True)
+    spin (began + 2e-6 * fromIntegral (k * 37 `mod` 100))
+    killThread thread >> void (takeMVar over)
+    named "mark" (pure ())
+    awake 1000
+  n <- readIORef reacted
+  promise ("interrupted, " ++ show k ++ ": " ++ show n ++ " of " ++ show sinks ++ " sinks received the reaction") (n `elem` [0, sinks])
+ where
+  sinks = 400
 
 -- | Ten million events to a blocked sink and to one that receives them, and what is kept of them.
 bounded :: IO ()

@@ -171,8 +171,8 @@ interrupt engine sensors name running next decision = case next of
   sensors' = map SomeBranch sensors
   ended stopped end = endedBy name end <$ report stopped Nothing
   -- Waits for the branch, but not for the others.
-  stopBranch others = do
-    end <- orReported decision (stopIt others)
+  stopBranch others = orReported decision $ do
+    end <- stopIt others
     (,) end <$> hasStopped (result end) decision
   stopIt others =
     requestStopAsync (cause decision) others >> requestStop (cause decision) [SomeBranch running] >> awaitOutcome running

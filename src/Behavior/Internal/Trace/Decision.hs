@@ -149,8 +149,9 @@ starting :: Decision -> IO a -> IO a
 starting decision act = maybe act (`startingAfter` act) (unreported decision)
 {-# INLINE starting #-}
 
+-- (Masked: what interrupts a receiver would leave its sink asleep, and the others without the event.)
 reportReaction :: Unreported -> Maybe String -> IO ()
-reportReaction what starts = reportEach (place what) $ \receiver ->
+reportReaction what starts = mask_ . reportEach (place what) $ \receiver ->
   Reacted (known what) {reactionParent = parentFor receiver (place what), reactionStarts = starts}
 {-# NOINLINE reportReaction #-}
 

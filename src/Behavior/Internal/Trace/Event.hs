@@ -126,7 +126,8 @@ data Reaction = Reaction
   -- ^ The named values of the signal, those it is computed from first. All were read in the
   -- transaction that decided. (Of ordered rules, only those of the conditions that have changed.)
   , reactionStopped :: !(Maybe StoppedBranch)
-  -- ^ The branch that was stopped; nothing if the operator was waiting.
+  -- ^ The branch that was stopped; nothing if the operator was waiting, or was cancelled while it stopped the
+  -- branch.
   , reactionStarts :: Maybe String
   -- ^ The branch that starts; nothing if the operator ends or waits.
   }
