@@ -6,6 +6,7 @@ import System.Exit (die)
 
 import qualified Abandons
 import qualified DeadCleanup
+import qualified EveryThread
 import qualified IndirectThrow
 import qualified LateRecovery
 import qualified Messages
@@ -26,6 +27,7 @@ import qualified StopsOnce
 import qualified Storm
 import qualified StuckLimits
 import qualified Traces
+import qualified Truth
 import qualified UndefinedOutside
 import qualified UninterruptibleCaller
 
@@ -41,6 +43,7 @@ attacks :: [(String, IO ())]
 attacks =
   [ ("Abandons", Abandons.attack)
   , ("DeadCleanup", DeadCleanup.attack)
+  , ("EveryThread", EveryThread.attack)
   , ("LateRecovery", LateRecovery.attack)
   , ("Messages", Messages.attack)
   , ("MutualThrow", MutualThrow.attack)
@@ -60,6 +63,7 @@ attacks =
   , ("Storm", Storm.attack)
   , ("StuckLimits", StuckLimits.attack)
   , ("Traces", Traces.attack)
+  , ("Truth", Truth.attack)
   , ("UndefinedOutside", UndefinedOutside.attack)
   ]
 
