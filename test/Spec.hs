@@ -39,6 +39,7 @@ import qualified Behavior.SpaceSpec
 import qualified Behavior.CancellationStressSpec
 import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
+import qualified Behavior.UnliftIOSpec
 import qualified Examples.DoorBatterySpec
 import qualified Examples.DroneSpec
 import qualified Examples.FleetSpec
@@ -105,6 +106,7 @@ main = hspec $ do
     describe "resumable" Behavior.ResumableSpec.spec
     describe "withTSem" Behavior.SemaphoreSpec.spec
   describe "Messages" Behavior.MessageSpec.spec
+  describe "Your own monad" Behavior.UnliftIOSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec
   describe "From outside" $ do

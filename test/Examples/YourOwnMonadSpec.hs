@@ -1,23 +1,23 @@
 {-# LANGUAGE GeneralizedNewtypeDeriving #-}
 
 -- |
--- The operators in a monad of the user's own, by 'withRunInIO': their promises hold there. (The
--- page "Your own monad" has examples, which run.)
+-- The operators in a monad of the user's own: their promises hold there. (The page "Your own monad"
+-- has examples, which run.)
 module Examples.YourOwnMonadSpec (spec) where
 
 import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar, readTVarIO, writeTVar)
 import Control.Exception (onException)
 import Control.Monad (void)
 import Control.Monad.IO.Class (MonadIO (..))
-import Control.Monad.IO.Unlift (MonadUnliftIO, withRunInIO)
+import Control.Monad.IO.Unlift (MonadUnliftIO)
 import Control.Monad.Trans.Reader (ReaderT (..), asks)
 import Test.Hspec
 
-import Behavior
-import Behavior.Parallel (allOf)
-import qualified Behavior.Signal as Signal
 import Behavior.Sim (exhaustively, explore)
-import Behavior.Time (atomically)
+import Behavior.UnliftIO
+import Behavior.UnliftIO.Parallel (allOf)
+import qualified Behavior.UnliftIO.Signal as Signal
+import Behavior.UnliftIO.Time (atomically)
 import Support (guarded)
 
 -- | What every part of the mission can use.
@@ -48,7 +48,7 @@ spec = guarded $ do
 
   it "a failure in that monad is a failure, and the environment is the same in every branch" $ do
     rover <- Rover <$> newTVarIO False <*> newTVarIO 0 <*> newTVarIO []
-    same <- runMission (allOfThese [env low, liftIO failed `orElse` env low]) rover
+    same <- runMission (allOf [env low, liftIO failed ? env low]) rover
     map (== low rover) same `shouldBe` [True, True]
 
 -- | Drives; the battery becomes low on the way.
@@ -58,7 +58,7 @@ mission = do
   charge <- env (\rover -> atomically (writeTVar (low rover) False))
   drain <- env (\rover -> sleep 1 >> atomically (writeTVar (low rover) True) >> sleep 3)
   let recharge = doing "recharge" 1 >> liftIO charge
-  withRunInIO $ \run -> drain `both` Signal.monitor batteryLow (run recharge) (run (doing "drive" 2))
+  liftIO drain `both` Signal.monitor batteryLow recharge (doing "drive" 2)
 
 -- | A behaviour that must be the only one.
 doing :: String -> Seconds -> Mission ()
@@ -69,9 +69,3 @@ doing name seconds = do
     others <- atomically (modifyTVar' notes (name :) >> modifyTVar' count (+ 1) >> readTVar count)
     let leave = atomically (modifyTVar' count (subtract 1))
     if others > 1 then error (name ++ " is not alone") else (sleep seconds `onException` leave) >> leave
-
-orElse :: MonadUnliftIO m => m a -> m a -> m a
-orElse first second = withRunInIO (\run -> run first ? run second)
-
-allOfThese :: MonadUnliftIO m => [m a] -> m [a]
-allOfThese acts = withRunInIO (\run -> allOf (map run acts))
