@@ -94,7 +94,7 @@ interrupted after what act = do
   end <- endsWithin 20000 what (\t -> void (forkIO (threadDelay after >> throwTo t (Boom after)))) act
   case end of
     Right () -> pure ()
-    Left e -> promise (what ++ ": " ++ show e) (maybe False (== Boom after) (fromException e))
+    Left e -> promise (what ++ ": " ++ show e) (fromException e == Just (Boom after))
   nothingLeft what
 
 -- | Each child requests the stop of the next, while the scope ends.
