@@ -6,6 +6,7 @@ import qualified Viewer.DiffSpec
 import qualified Viewer.FileSpec
 import qualified Viewer.FormatSpec
 import qualified Viewer.InterruptionSpec
+import qualified Viewer.OutputSpec
 import qualified Viewer.PictureSpec
 import qualified Viewer.PlainLinesSpec
 import qualified Viewer.SimulatedSpec
@@ -26,6 +27,7 @@ main = hspec $ do
   describe "An event as a line of text" Viewer.PlainLinesSpec.spec
   describe "The tree" Viewer.TreeSpec.spec
   describe "The tree in the terminal" Viewer.TerminalSpec.spec
+  describe "What a program prints while the tree is in the terminal" Viewer.OutputSpec.spec
   describe "The timeline" $ do
     Viewer.SvgSpec.spec
     Viewer.PictureSpec.spec

@@ -11,7 +11,7 @@ import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
 import Behavior.Sim (Schedule (..))
-import Behavior.Trace.Viewing (liveTree, viewEvents, viewing)
+import Behavior.Trace.Viewing (viewEvents, viewing)
 import Exploration
 import Mission
 import Options
@@ -20,12 +20,11 @@ main :: IO ()
 main = do
   o <- getArgs >>= handleParseResult . parse
   hSetBuffering stdout LineBuffering -- so that a pipe gets each line at once
-  let printed = if liveTree (shown o) then const (pure ()) else putStrLn
   how <- runBehavior $ case mode o of
-    Really -> end <$> viewing (shown o) (mission o printed)
+    Really -> end <$> viewing (shown o) (mission o putStrLn)
     Simulated number -> do
       (report, m, events') <- simulatedWithEvents o (maybe NonPreemptive (Seeded . fromInteger) number)
-      traverse_ printed report
+      traverse_ putStrLn report
       viewEvents (shown o) events'
       pure (maybe NotOver end m)
     Explored n -> do

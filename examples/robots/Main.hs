@@ -29,8 +29,7 @@ main :: IO ()
 main = do
   hSetBuffering stdout LineBuffering
   o <- customExecParser defaultPrefs commandLine
-  let say = if liveTree (shown o) then const (pure ()) else putStrLn
-      mission = named "mission" (demo o say) >> say "the demo is over"
+  let mission = named "mission" (demo o putStrLn) >> putStrLn "the demo is over"
   runBehavior $
     if inSimulation o
       then do

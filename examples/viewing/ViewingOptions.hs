@@ -12,6 +12,6 @@ viewingOptions =
   Viewing
     <$> file "trace" "write the events of the run to this file; behavior-trace shows it"
     <*> file "timeline" "draw the run as an SVG file"
-    <*> switch (long "tree" <> help "show what runs as a tree, in place of the lines that are printed otherwise")
+    <*> switch (long "tree" <> help "show what runs as a tree, below the lines that are printed")
  where
   file name what = optional (strOption (long name <> metavar "FILE" <> help what))

@@ -15,6 +15,7 @@ import Behavior.Trace.Terminal
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
+import Viewer.Screen
 import Viewer.Temporary
 
 spec :: Spec
@@ -86,7 +87,7 @@ spec = do
       forAllBlind (listOf1 (resize 20 likelyEvents)) $ \batches ->
         let trees = map (treeLines 12 40 61) (tail (scanl (foldl' watch) nothingYet batches))
             written = concat (zipWith (frame True id) (0 : map length trees) trees)
-         in screen written === shown (last trees)
+         in screenOf written === shown (last trees)
 
     it "has no colours if there are to be none" $ do
       let tree = treeLines 30 100 40 (after mission)
@@ -113,27 +114,3 @@ coloured :: String -> Bool
 coloured ('\ESC' : '[' : rest) | (digits, 'm' : _) <- span (\c -> isDigit c || c == ';') rest = not (null digits)
 coloured (_ : rest) = coloured rest
 coloured [] = False
-
--- What a terminal shows after this output: it knows the sequences that a frame may contain, and no
--- other ones.
-screen :: String -> [String]
-screen = go [] "" "" []
- where
-  -- The lines above the cursor (the nearest first), the text before it (reversed) and after it in
-  -- its line, and the lines below.
-  go above before behind below output = case output of
-    '\ESC' : '[' : rest
-      | (digits, command : rest') <- span (\c -> isDigit c || c == ';') rest -> case command of
-          'F'
-            | (passed, line : above') <- splitAt (read digits - 1) above ->
-                go above' "" line (reverse passed ++ [reverse before ++ behind] ++ below) rest'
-          'K' -> go above before "" below rest'
-          'J' -> go above before "" [] rest'
-          'm' -> go above before behind below rest'
-          _ -> ["unknown sequence " ++ show (digits, command)]
-    '\r' : rest -> go above "" (reverse before ++ behind) below rest
-    '\n' : rest -> go ((reverse before ++ behind) : above) "" (concat (take 1 below)) (drop 1 below) rest
-    c : rest
-      | c < ' ' -> ["unknown character " ++ show c]
-      | otherwise -> go above (c : before) (drop 1 behind) below rest
-    [] -> reverse above ++ filter (not . null) ((reverse before ++ behind) : below)

@@ -19,6 +19,7 @@ import Data.Bifunctor (bimap)
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (nub, nubBy, sortOn)
 import Data.Maybe (isJust, listToMaybe)
+import Data.Ord (Down (..))
 import Data.Text (Text)
 import qualified Data.Text as Text
 import Graphics.Svg.Core (Element)
@@ -65,7 +66,7 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
  where
   markers = map fst labelled
   labelled = concat (IntMap.elems byLane)
-  byLane = IntMap.map inRows (IntMap.fromListWith (++) [(laneOf r, [(x (reactionTime r), r)]) | r <- reverse (sortOn reactionTime shown)])
+  byLane = IntMap.map inRows (IntMap.fromListWith (++) [(laneOf r, [(x (reactionTime r), r)]) | r <- sortOn (\r -> Down (reactionTime r, reactionNumber r)) shown])
   inRows found@((_, r) : _) = zip ms (rowsFor left right most names ms)
    where
     (ms, most) = case map (\d -> together d (laneOf r) found) [0, 4, 8] of

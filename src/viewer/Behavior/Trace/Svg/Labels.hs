@@ -8,7 +8,7 @@ module Behavior.Trace.Svg.Labels
   ) where
 
 import Data.List (intercalate, minimumBy)
-import Data.Maybe (listToMaybe)
+import Data.Maybe (listToMaybe, maybeToList)
 import Data.Ord (comparing)
 import qualified Data.Text as Text
 import Graphics.Svg.Core (Element)
@@ -74,7 +74,7 @@ labels notes right h taken = go (-1) 0 0
     end = minimum (right - 4 : [l | (l, _) <- there, l >= left] ++ [markLeft o - 6 | o <- later, isNoted o, not (fitsWhole o)])
     there = [interval | (lane, interval) <- taken, lane == markLane m]
     room from = (end - from) * 12 / 11
-    text isNamed = inertUpTo 120 (intercalate ": " ([nameOf m | isNamed] ++ [why | Just why <- [whyOf m]]))
+    text isNamed = inertUpTo 120 (intercalate ": " ([nameOf m | isNamed] ++ maybeToList (whyOf m)))
 
 -- What to draw, given the upper edge of the bar; where it ends; and whether it contains all there is to say.
 -- The last text in this lane ends at `used`, the next bar begins at `next`.

@@ -12,6 +12,7 @@ module Behavior.Trace.Svg.Pauses
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (sortOn)
+import Data.Ord (Down (..))
 import qualified Data.Text as Text
 import Graphics.Svg.Core (Element)
 
@@ -58,10 +59,10 @@ pauses x r placed = take 300 (concatMap inSpan placed)
     IntMap.fromListWith
       (++)
       [ (n, [(reactionTime a, a)])
-      | a <- reverse (sortOn reactionTime (reactions r))
+      | a <- sortOn (\a -> Down (reactionTime a, reactionNumber a)) (reactions r)
+      , reactionOperator a /= "monitor"
       , Inside n <- [reactionParent a]
       , Nothing <- [reactionStopped a]
-      , reactionOperator a /= "monitor"
       ]
 
 -- | A line between those pixels, with a text in it if there is room for one. The upper edge of its lane is there, and a bar has

@@ -1,0 +1,201 @@
+-- |
+-- What happens in the pictures of "Viewer.PictureSpec".
+module Viewer.Missions
+  ( -- * Missions
+    legs
+  , watering
+  , doors
+  , locked
+  , buttoned
+  , crowded
+  , crowdedBy
+  , robots
+  , waited
+  , beside
+  , wateredAgain
+
+    -- * Other events
+  , withoutReason
+  , isInterruption
+  , withChange
+  , isReaction
+  , byOperator
+  , succeeding
+  , notBed
+  , isLater
+  , renamedTo
+  , renamed
+  ) where
+
+import Behavior.Time (Seconds)
+import Behavior.Trace
+import Viewer.Examples
+
+-- | One after the other, a second each.
+legs :: Int -> [Event]
+legs n = concat [ended k Top ("leg " ++ [toEnum (96 + k)]) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. n]]
+
+-- | Beds are watered; the robot recharges, and goes on.
+watering :: [Event]
+watering =
+  ended 1 Top "mission" 0 Nothing 37.5 Succeeded
+    ++ ended 2 (Inside 1) "water" 0 Nothing 16 (StoppedBy low)
+    ++ concat [bed (2 + k) 2 k (4.5 * fromIntegral (k - 1)) | k <- [1 .. 3]]
+    ++ ended 6 (Inside 2) "water bed 4" 13.5 Nothing 16 (StoppedBy low)
+    ++ [Reacted (Reaction 7 (Inside 1) "monitor" 16 changes (Just (StoppedBranch "task" 16 0 (StoppedBy low))) (Just "recovery"))]
+    ++ ended 8 (Inside 1) "recharge" 16 (Just 7) 24 Succeeded
+    ++ [Reacted (Reaction 9 (Inside 1) "monitor" 24 [Change "battery" (Just "18") "100", Change "batteryLow" (Just "True") "False"] Nothing (Just "task"))]
+    ++ ended 10 (Inside 1) "water" 24 (Just 9) 37.5 Succeeded
+    ++ concat [bed (7 + k) 10 k (24 + 4.5 * fromIntegral (k - 4)) | k <- [4 .. 6]]
+ where
+  low = SignalChanged 7 changes
+  changes = [Change "battery" (Just "50") "18", Change "batteryLow" (Just "False") "True"]
+  bed :: Int -> Int -> Int -> Seconds -> [Event]
+  bed n parent k begin = ended n (Inside parent) ("water bed " ++ show k) begin Nothing (begin + 4.5) Succeeded
+
+-- | Doors are locked; the robot is interrupted when it smashes one.
+doors :: [Event]
+doors =
+  locked
+    ++ ended 4 (Inside 1) "smash back door" 2 Nothing 2.55 (StoppedBy low)
+    ++ [Reacted (Reaction 5 (Inside 1) "monitor" 2.55 changes (Just (StoppedBranch "task" 2.55 0 (StoppedBy low))) (Just "recovery"))]
+    ++ ended 6 (Inside 1) "recharge" 2.55 (Just 5) 4.5 Succeeded
+ where
+  low = SignalChanged 5 changes
+  changes = [Change "battery" (Just "10") "9"]
+
+-- | The doors are locked.
+locked :: [Event]
+locked =
+  ended 1 Top "mission" 0 Nothing 10 Succeeded
+    ++ ended 2 (Inside 1) "open front door" 0 Nothing 1 (FailedWith "the front door is locked")
+    ++ ended 3 (Inside 1) "open back door" 1 Nothing 2 (FailedWith "the back door is locked")
+
+-- | The red button ends a mission.
+buttoned :: [Event]
+buttoned =
+  ended 1 Top "mission" 0 Nothing 7 Succeeded
+    ++ ended 2 (Inside 1) "load" 0 Nothing 2 Succeeded
+    ++ ended 3 (Inside 1) "drive" 2 Nothing 6 (StoppedBy (SignalChanged 4 changes))
+    ++ [Reacted (Reaction 4 (Inside 1) "insteadWhen" 6 changes (Just (StoppedBranch "branch" 4 0 (StoppedBy (SignalChanged 4 changes)))) (Just "emergency"))]
+ where
+  changes = [Change "red button" (Just "False") "True"]
+
+-- | Five interruptions within two seconds, in a minute.
+crowded :: [Event]
+crowded = crowdedBy 5 0.4
+
+-- | That many interruptions in a minute, with so much time from one to the next.
+crowdedBy :: Int -> Seconds -> [Event]
+crowdedBy n apart = ended 1 Top "mission" 0 Nothing 60 Succeeded ++ concatMap one [1 .. n]
+ where
+  one k =
+    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) Nothing (at k) (StoppedBy (SignalChanged (3 * k + 1) (changes k)))
+      ++ [Reacted (Reaction (3 * k + 1) (Inside 1) "switch" (at k) (changes k) (Just (StoppedBranch "branch" 0.4 0 (StoppedBy (SignalChanged (3 * k + 1) (changes k))))) (Just "branch"))]
+  at k = if k == 0 then 0 else 30 + apart * fromIntegral k
+  changes k = [Change "obstacle" (Just (show k)) (show (k + 1))]
+
+-- | Several robots side by side, each of which is interrupted.
+robots :: Int -> [Event]
+robots n = ended 1 Top "mission" 0 Nothing 6 Succeeded ++ concatMap robot [1 .. n]
+ where
+  robot k =
+    ended (10 * k) (Inside 1) ("robot " ++ show k) 0 Nothing 6 Succeeded
+      ++ ended (10 * k + 1) (Inside (10 * k)) "drive" 0 Nothing (2 + at k) (StoppedBy (SignalChanged (10 * k + 2) low))
+      ++ [Reacted (Reaction (10 * k + 2) (Inside (10 * k)) "monitor" (2 + at k) low (Just (StoppedBranch "task" (2 + at k) 0 (StoppedBy (SignalChanged (10 * k + 2) low)))) (Just "recovery"))]
+      ++ ended (10 * k + 3) (Inside (10 * k)) "charge" (2 + at k) (Just (10 * k + 2)) (4 + at k) Succeeded
+      ++ ended (10 * k + 4) (Inside (10 * k)) "drive" (4 + 2 * at k) Nothing 6 Succeeded
+  at k = 0.3 * fromIntegral (k `mod` 4) :: Seconds
+  low = [Change "battery low" (Just "False") "True"]
+
+-- | An order comes after a while.
+waited :: [Event]
+waited =
+  ended 1 Top "mission" 0 Nothing 10 Succeeded
+    ++ ended 2 (Inside 1) "drive" 0 Nothing 2 Succeeded
+    ++ [Reacted (Reaction 3 (Inside 1) "waitUntil" 7 [Change "order" (Just "False") "True"] Nothing Nothing)]
+    ++ ended 4 (Inside 1) "carry" 7 Nothing 10 Succeeded
+
+-- | Two parts side by side; one of them ends at that time.
+beside :: Seconds -> [Event]
+beside t =
+  ended 1 Top "mission" 0 Nothing 10 Succeeded
+    ++ ended 2 (Inside 1) "look" 0 Nothing t Succeeded
+    ++ ended 3 (Inside 1) "listen" 0 Nothing 5 (StoppedBy (SiblingFinished "left"))
+
+-- | Beds are watered; after an interruption, from the first one on.
+wateredAgain :: [Event]
+wateredAgain =
+  ended 1 Top "mission" 0 Nothing 30 Succeeded
+    ++ ended 2 (Inside 1) "water" 0 Nothing 12 (StoppedBy (SignalChanged 9 [Change "low" Nothing "True"]))
+    ++ ended 3 (Inside 2) "bed 1" 0 Nothing 5 Succeeded
+    ++ ended 4 (Inside 2) "bed 2" 5 Nothing 10 Succeeded
+    ++ ended 5 (Inside 1) "water" 15 Nothing 30 Succeeded
+    ++ ended 6 (Inside 5) "bed 1" 15 Nothing 20 Succeeded
+    ++ ended 7 (Inside 5) "bed 2" 20 Nothing 25 Succeeded
+
+-- | Without the text of its failure.
+withoutReason :: Event -> Event
+withoutReason event = case event of
+  Ended s t (FailedWith _) -> Ended s t (FailedWith "")
+  _ -> event
+
+-- | A reaction that stopped something.
+isInterruption :: Event -> Bool
+isInterruption event = case event of
+  Reacted Reaction {reactionStopped = Just _} -> True
+  _ -> False
+
+-- | A reaction with this value too.
+withChange :: Change -> Event -> Event
+withChange change event = case event of
+  Reacted r -> Reacted r {reactionChanges = reactionChanges r ++ [change]}
+  _ -> event
+
+-- | Any reaction.
+isReaction :: Event -> Bool
+isReaction event = case event of
+  Reacted _ -> True
+  _ -> False
+
+-- | A reaction of the operator with this name.
+byOperator :: String -> Event -> Event
+byOperator operator event = case event of
+  Reacted r -> Reacted r {reactionOperator = operator}
+  _ -> event
+
+-- | The end of a span is that it succeeded.
+succeeding :: Event -> Event
+succeeding event = case event of
+  Ended s t _ -> Ended s t Succeeded
+  _ -> event
+
+-- | An event of any other span.
+notBed :: String -> Event -> Bool
+notBed bed event = case event of
+  Began s -> spanName s /= bed
+  Ended s _ _ -> spanName s /= bed
+  _ -> True
+
+-- | An event of a span that began after the interruption of 'wateredAgain'.
+isLater :: Event -> Bool
+isLater event = case event of
+  Began s -> spanBegan s > 12
+  Ended s _ _ -> spanBegan s > 12
+  _ -> False
+
+-- | A span has this name.
+renamedTo :: String -> Event -> Event
+renamedTo name event = case event of
+  Began s -> Began s {spanName = name}
+  Ended s t end -> Ended s {spanName = name} t end
+  _ -> event
+
+-- | So that many spans have the same name.
+renamed :: Event -> Event
+renamed event = case event of
+  Began s -> Began (short s)
+  Ended s t end -> Ended (short s) t end
+  _ -> event
+ where
+  short s = s {spanName = ["ab" !! (spanNumber s `mod` 2)]}
