@@ -8,8 +8,8 @@ import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Diff
 import Behavior.Trace.File (relativeTo)
+import Behavior.Trace.Path (path)
 import Behavior.Trace.Recording
-import Behavior.Trace.Summary (path)
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden

@@ -8,6 +8,7 @@ import Test.QuickCheck hiding (total)
 
 import Behavior.Trace
 import Behavior.Trace.Diff (difference, renderDifference)
+import Behavior.Trace.Path
 import Behavior.Trace.Recording
 import Behavior.Trace.Summary
 import Behavior.Trace.Tree (renderTree)

@@ -9,18 +9,20 @@ module Behavior.Trace.Diff
   ) where
 
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (sortOn)
+import Data.List (minimumBy, sortOn)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (listToMaybe)
-import Data.Ord (Down (..))
+import Data.Ord (Down (..), comparing)
 
 import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Describe
+import Behavior.Trace.Path
 import Behavior.Trace.Recording
-import Behavior.Trace.Summary (Path (..), columns, renderPath, timesOfBoth)
+import Behavior.Trace.Summary (timesOfBoth)
 import qualified Behavior.Trace.Summary as Summary
+import Behavior.Trace.Table
 
 -- | The differences.
 --
@@ -66,14 +68,14 @@ data Side = Side
 difference :: Recording -> Recording -> Difference
 difference a b =
   Difference
-    { firstDivergence = case sortOn earliest (divergences [] 0 (items a) (items b)) of
+    { firstDivergence = case divergences (path []) 0 (items a) (items b) [] of
         [] -> Nothing
-        (_, d) : _ -> Just d
+        found -> Just (snd (minimumBy (comparing earliest) found))
     , timesByPath =
         sortOn
           (\(_, x, y) -> Down (abs (sideTotal x - sideTotal y)))
-          [ (path, x, y)
-          | (path, inFirst, inSecond) <- timesOfBoth a b
+          [ (where', x, y)
+          | (where', inFirst, inSecond) <- timesOfBoth a b
           , let (x, y) = (side inFirst, side inSecond)
           , x /= y
           ]
@@ -96,16 +98,16 @@ data Item = Item
 
 -- Times are relative to the beginning of the recording.
 items :: Recording -> [Item]
-items r = below 0 (roots r)
+items r = below loose (roots r)
  where
-  below n found = sortOn itemBegan (map reacted (Map.findWithDefault [] n inside) ++ map ran found)
+  below these found = sortOn itemBegan (map reacted these ++ map ran found)
   ran n =
     Item
       { itemName = spanName (nodeSpan n)
       , itemBegan = spanBegan (nodeSpan n) - start
       , itemEnded = max (nodeUntil r n) (spanBegan (nodeSpan n)) - start
       , itemOutcome = withoutValues (snd <$> nodeEnd n)
-      , itemInner = below (spanNumber (nodeSpan n)) (nodeChildren n)
+      , itemInner = below (IntMap.findWithDefault [] (spanNumber (nodeSpan n)) inside) (nodeChildren n)
       }
   reacted x =
     Item
@@ -123,12 +125,7 @@ items r = below 0 (roots r)
     (stopped, started) = IntMap.findWithDefault ([], []) (reactionNumber x) involved
   involved = reactionSpans r
   start = from r
-  inside :: Map Int [Reaction]
-  inside = Map.fromListWith (++) [(parent x, [x]) | x <- reverse (reactions r)]
-  parent x = case reactionParent x of
-    Inside n | Map.member n known -> n
-    _ -> 0
-  known = Map.fromList [(spanNumber (nodeSpan n), ()) | n <- nodes r]
+  (loose, inside) = reactionsInside r
 
 -- Values of signals are left out: those of a sensor are never the same twice.
 withoutValues :: Maybe End -> String
@@ -139,23 +136,23 @@ signals :: [Change] -> String
 signals [] = "a signal changed"
 signals changes = nameText (changeSignal (last changes)) ++ " changed"
 
--- All places, each with its rank and depth. Where only one of the recordings has a run, what ran in it is no
--- further divergence.
-divergences :: [String] -> Int -> [Item] -> [Item] -> [((Int, Int), Divergence)]
-divergences outer depth xs ys = concatMap compared (Map.toList pairs) ++ reordered
+-- All places, each with its rank and depth, before the rest. Where only one of the recordings has a run, what ran
+-- in it is no further divergence.
+divergences :: Path -> Int -> [Item] -> [Item] -> [Diverged] -> [Diverged]
+divergences outer depth xs ys rest = foldr compared (reordered ++ rest) (Map.toList pairs)
  where
   pairs = Map.unionWith (\(x, _) (_, y) -> (x, y)) (Map.map (\x -> (Just x, Nothing)) left) (Map.map (\y -> (Nothing, Just y)) right)
   left = numbered xs
   right = numbered ys
-  compared (key, found) = case found of
+  compared (key, found) after = case found of
     (Just x, Just y) ->
       [ diverged 0 key (min (itemEnded x) (itemEnded y)) (itemOutcome x) (itemOutcome y)
       | itemOutcome x /= itemOutcome y
       ]
-        ++ divergences (fst key : outer) (depth + 1) (itemInner x) (itemInner y)
-    (Just x, Nothing) -> [diverged 1 key (itemBegan x) (itemOutcome x) "did not run"]
-    (Nothing, Just y) -> [diverged 1 key (itemBegan y) "did not run" (itemOutcome y)]
-    (Nothing, Nothing) -> []
+        ++ divergences (inPath (fst key) outer) (depth + 1) (itemInner x) (itemInner y) after
+    (Just x, Nothing) -> diverged 1 key (itemBegan x) (itemOutcome x) "did not run" : after
+    (Nothing, Just y) -> diverged 1 key (itemBegan y) "did not run" (itemOutcome y) : after
+    (Nothing, Nothing) -> after
   -- One after the other here, and in the opposite order there.
   reordered =
     [ diverged 1 k (min (itemBegan x) (itemBegan y')) ("ran before " ++ quoted (fst k')) ("ran after " ++ quoted (fst k'))
@@ -165,8 +162,10 @@ divergences outer depth xs ys = concatMap compared (Map.toList pairs) ++ reorder
     , itemEnded y' <= itemBegan y
     , (itemBegan y', itemEnded y') /= (itemBegan y, itemEnded y)
     ]
-  diverged :: Int -> (String, Int) -> Seconds -> String -> String -> ((Int, Int), Divergence)
-  diverged rank (name, n) at did did' = ((rank, depth), Divergence at (Path (name : outer)) n did did')
+  diverged :: Int -> (String, Int) -> Seconds -> String -> String -> Diverged
+  diverged rank (name, n) at did did' = ((rank, depth), Divergence at (inPath name outer) n did did')
+
+type Diverged = ((Int, Int), Divergence)
 
 -- Each with its name and its number among those with the same name.
 numbered :: [Item] -> Map (String, Int) Item
@@ -197,13 +196,13 @@ renderDifference d = unlines (remarks ++ diverging ++ [""] ++ taking)
     | null (timesByPath d) = ["Time by path: no difference"]
     | otherwise =
         "Time by path"
-          : columns 5 (["difference [s]", "first [s]", "second [s]", "first runs", "second runs", "path"] : map row (timesByPath d))
-  row (path, x, y) =
+          : columns 5 ["difference [s]", "first [s]", "second [s]", "first runs", "second runs", "path"] row (timesByPath d)
+  row (where', x, y) =
     [ signed (sideTotal y - sideTotal x)
     , milliseconds (sideTotal x)
     , milliseconds (sideTotal y)
     , show (sideRuns x)
     , show (sideRuns y)
-    , renderPath path
+    , renderPath where'
     ]
   signed t = (if t > 0 then "+" else "") ++ milliseconds t

@@ -10,15 +10,17 @@ module Behavior.Trace.Recording
   , nodes
   , nodeUntil
   , reactionSpans
+  , reactionsInside
   , withoutOperators
   ) where
 
 import Control.Applicative ((<|>))
 import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Lazy as LazyIntMap
 import qualified Data.IntMap.Strict as IntMap
 import qualified Data.IntSet as IntSet
 import Data.List (foldl', sortOn)
-import Data.Maybe (isNothing)
+import Data.Maybe (fromMaybe)
 import Prelude hiding (until)
 
 import Behavior.Time (Seconds)
@@ -53,42 +55,50 @@ data Node = Node
   deriving (Eq, Show)
 
 -- | The recording of these events. Every list of events has one, also a damaged one: a span whose
--- parent is unknown is in no other.
+-- parent is unknown is in no other. A parent has a smaller number; one that has not is unknown: so no
+-- span is its own ancestor.
 --
 -- @since 0.1.0.0
 recording :: [Event] -> Recording
 recording events =
   Recording
-    { roots = [node s | s <- IntMap.elems spans, isNothing (parentOf s)]
-    , reactions = IntMap.elems (IntMap.fromList [(reactionNumber r, r) | Reacted r <- events])
-    , lost = sum [n | Lost n <- events]
-    , from = if null times then 0 else minimum times
-    , until = if null times then 0 else maximum times
+    { roots = fst (IntMap.foldrWithKey' place ([], IntMap.empty) (spansSoFar known))
+    , reactions = IntMap.elems (reactionsSoFar known)
+    , lost = lostSoFar known
+    , from = fromMaybe 0 (earliest known)
+    , until = fromMaybe 0 (latest known)
     }
  where
-  spans = IntMap.fromList (concatMap spanOf events)
-  spanOf (Began s) = [(spanNumber s, s)]
-  spanOf (Ended s _ _) = [(spanNumber s, s)]
-  spanOf _ = []
-  ends = IntMap.fromList [(spanNumber s, (t, end)) | Ended s t end <- events]
-  children :: IntMap [Span]
-  children = foldl' insert IntMap.empty (reverse (IntMap.elems spans))
-  insert known s = maybe known (\n -> IntMap.insertWith (++) n [s] known) (parentOf s)
-  -- A parent has a smaller number: so no damage makes a cycle.
-  parentOf s = case spanParent s of
-    Inside n | n < spanNumber s, IntMap.member n spans -> Just n
-    _ -> Nothing
-  node s =
-    Node
-      { nodeSpan = s
-      , nodeEnd = IntMap.lookup (spanNumber s) ends
-      , nodeChildren = map node (IntMap.findWithDefault [] (spanNumber s) children)
-      }
-  times = concatMap timesOf events
-  timesOf (Began s) = [spanBegan s]
-  timesOf (Ended s t _) = [spanBegan s, t]
-  timesOf (Reacted r) = [reactionTime r]
-  timesOf (Lost _) = []
+  known = foldl' learn (Known IntMap.empty IntMap.empty 0 Nothing Nothing) events
+  -- The last span comes first: then those in a span come before it.
+  place n (s, end) (outermost, waiting) = case spanParent s of
+    Inside p | p < n, IntMap.member p (spansSoFar known) -> (outermost, IntMap.insertWith (++) p [node] others)
+    _ -> (node : outermost, others)
+   where
+    node = Node s end (IntMap.findWithDefault [] n waiting)
+    others = IntMap.delete n waiting
+
+-- What some events say, by the numbers of spans and reactions.
+data Known = Known
+  { spansSoFar :: !(IntMap (Span, Maybe (Seconds, End)))
+  , reactionsSoFar :: !(IntMap Reaction)
+  , lostSoFar :: !Int
+  , earliest :: !(Maybe Seconds)
+  , latest :: !(Maybe Seconds)
+  }
+
+learn :: Known -> Event -> Known
+learn known = \case
+  Began s -> at (spanBegan s) known {spansSoFar = IntMap.insertWith began (spanNumber s) (s, Nothing) (spansSoFar known)}
+  Ended s t end -> at t (at (spanBegan s) known {spansSoFar = IntMap.insert (spanNumber s) (s, Just (t, end)) (spansSoFar known)})
+  Reacted r -> at (reactionTime r) known {reactionsSoFar = IntMap.insert (reactionNumber r) r (reactionsSoFar known)}
+  -- (An overflow would make it negative.)
+  Lost n -> known {lostSoFar = if n > maxBound - lostSoFar known then maxBound else lostSoFar known + max 0 n}
+ where
+  began (s, _) (_, end) = (s, end)
+  at t k
+    | t /= t = k
+    | otherwise = k {earliest = Just $! maybe t (min t) (earliest k), latest = Just $! maybe t (max t) (latest k)}
 
 -- | All spans of the recording, each before those in it.
 --
@@ -141,11 +151,24 @@ withoutOperators events = concatMap kept events
   kept = \case
     Began s -> [Began (outermost s) | spanKind s == Named]
     Ended s t end -> [Ended (outermost s) t end | spanKind s == Named]
-    Reacted r -> [Reacted r {reactionParent = fst (namedAround Nothing (reactionParent r))}]
+    Reacted r -> [Reacted r {reactionParent = fst (namedAround (reactionNumber r) (reactionParent r))}]
     Lost n -> [Lost n]
-  outermost s = let (parent, reaction) = namedAround (spanReaction s) (spanParent s) in s {spanParent = parent, spanReaction = reaction}
+  outermost s = let (parent, reaction) = around s in s {spanParent = parent, spanReaction = reaction}
   -- The innermost named span around, and the reaction that started the innermost branch up to it.
-  namedAround reaction = \case
-    Inside n | Just s <- IntMap.lookup n others -> namedAround (reaction <|> spanReaction s) (spanParent s)
-    parent -> (parent, reaction)
-  others = IntMap.fromList [(spanNumber s, s) | Began s <- events, spanKind s /= Named]
+  around s = (<|>) (spanReaction s) <$> namedAround (spanNumber s) (spanParent s)
+  namedAround n = \case
+    Inside p | p < n, Just found <- IntMap.lookup p aroundOthers -> found
+    parent -> (parent, Nothing)
+  aroundOthers = LazyIntMap.fromList [(spanNumber s, around s) | Began s <- events, spanKind s /= Named]
+
+-- | The reactions whose operators ran in no span that is known, and those in each span, by its number.
+--
+-- @since 0.1.0.0
+reactionsInside :: Recording -> ([Reaction], IntMap [Reaction])
+reactionsInside r = ([x | (Nothing, x) <- found], IntMap.fromListWith (++) [(n, [x]) | (Just n, x) <- reverse found])
+ where
+  found = [(parent (reactionParent x), x) | x <- reactions r]
+  parent = \case
+    Inside n | IntSet.member n known -> Just n
+    _ -> Nothing
+  known = IntSet.fromList (map (spanNumber . nodeSpan) (nodes r))

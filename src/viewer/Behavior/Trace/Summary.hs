@@ -4,16 +4,12 @@ module Behavior.Trace.Summary
   ( Summary (..)
   , Times (..)
   , Interruptions (..)
-  , Path (..)
-  , path
   , summary
   , timesOfBoth
   , renderSummary
-  , renderPath
-  , columns
   ) where
 
-import Data.List (foldl', intercalate, sort, sortOn, transpose)
+import Data.List (foldl', intercalate, sort, sortOn)
 import qualified Data.IntMap.Strict as IntMap
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
@@ -22,29 +18,13 @@ import Data.Ord (Down (..))
 import Behavior.Time (Seconds)
 import Behavior.Trace hiding (named)
 import Behavior.Trace.Describe
+import Behavior.Trace.Path
 import Behavior.Trace.Recording
+import Behavior.Trace.Table
 
 -- $setup
 -- >>> import Behavior.Trace
 -- >>> import Behavior.Trace.Recording
-
--- | The names of the spans with a name around a span, and its own. A loop can make ten thousand
--- spans one inside the other; so paths share the outer names.
---
--- @since 0.1.0.0
-newtype Path = Path
-  { innermostFirst :: [String]
-  }
-  deriving (Eq, Show)
-
--- | The path with these names, the outermost first.
---
--- >>> path ["mission", "survey"]
--- Path {innermostFirst = ["survey","mission"]}
---
--- @since 0.1.0.0
-path :: [String] -> Path
-path = Path . reverse
 
 -- | What a recording says about all runs of the same things.
 --
@@ -91,7 +71,7 @@ data Interruptions = Interruptions
 --
 -- >>> let survey n t = Ended (Span n Top Named "survey" 0 Nothing) t Succeeded
 -- >>> times (summary (recording [survey 1 2, survey 2 3, survey 3 7]))
--- [(Path {innermostFirst = ["survey"]},Times {runs = 3, total = 12.0, median = 3.0, longest = 7.0, outcomes = [("succeeded",3)]})]
+-- [(path ["survey"],Times {runs = 3, total = 12.0, median = 3.0, longest = 7.0, outcomes = [("succeeded",3)]})]
 --
 -- @since 0.1.0.0
 summary :: Recording -> Summary
@@ -109,7 +89,7 @@ summary r =
     , lostEvents = lost r
     }
  where
-  byPath = flatten [] (gather r (roots r))
+  byPath = flatten (path []) (gather r (roots r)) []
   isFailure (FailedWith _) = True
   isFailure (FaultedWith _) = True
   isFailure _ = False
@@ -124,31 +104,30 @@ newtype Level = Level (Map String ([Run], Level))
 --
 -- @since 0.1.0.0
 timesOfBoth :: Recording -> Recording -> [(Path, Maybe Times, Maybe Times)]
-timesOfBoth r s = both [] (gather r (roots r)) (gather s (roots s))
+timesOfBoth r s = both (path []) (gather r (roots r)) (gather s (roots s)) []
  where
-  both outer (Level xs) (Level ys) =
-    concat
-      [ (Path (name : outer), timesOf . fst <$> x, timesOf . fst <$> y) : both (name : outer) (within x) (within y)
-      | name <- Map.keys (xs <> ys)
-      , let (x, y) = (Map.lookup name xs, Map.lookup name ys)
-      ]
-  within = maybe (Level Map.empty) snd
+  both outer (Level xs) (Level ys) rest = foldr one rest (Map.keys (xs <> ys))
+   where
+    one name after = (here, timesOf . fst <$> x, timesOf . fst <$> y) : both here (inside x) (inside y) after
+     where
+      here = inPath name outer
+      (x, y) = (Map.lookup name xs, Map.lookup name ys)
+  inside = maybe (Level Map.empty) snd
 
 gather :: Recording -> [Node] -> Level
 gather r = level
  where
-  level found = Level (Map.map merge (Map.fromListWith (++) [(spanName (nodeSpan n), [n]) | n <- reverse (named found)]))
+  level found = Level (Map.map merge (Map.fromListWith (++) [(spanName (nodeSpan n), [n]) | n <- reverse (foldr named [] found)]))
   merge same = (map run same, level (concatMap nodeChildren same))
   run n = (max 0 (nodeUntil r n - spanBegan (nodeSpan n)), snd <$> nodeEnd n)
   -- Operators and branches are no part of a path.
-  named = concatMap $ \n -> if spanKind (nodeSpan n) == Named then [n] else named (nodeChildren n)
+  named n rest = if spanKind (nodeSpan n) == Named then n : rest else foldr named rest (nodeChildren n)
 
-flatten :: [String] -> Level -> [(Path, [Run])]
-flatten outer (Level names) =
-  concat
-    [ (Path (name : outer), found) : flatten (name : outer) inner
-    | (name, (found, inner)) <- Map.toList names
-    ]
+-- Before the rest.
+flatten :: Path -> Level -> [(Path, [Run])] -> [(Path, [Run])]
+flatten outer (Level names) rest = Map.foldrWithKey one rest names
+ where
+  one name (found, inner) after = let here = inPath name outer in (here, found) : flatten here inner after
 
 timesOf :: [Run] -> Times
 timesOf found =
@@ -184,14 +163,14 @@ renderSummary :: Summary -> String
 renderSummary s =
   unlines . intercalate [""] . filter (not . null) $
     [ [lostRemark (lostEvents s) | lostEvents s /= 0]
-    , table "Time by path" ["runs", "total [s]", "median [s]", "longest [s]", "outcomes", "path"] 4 (map timesRow (times s))
-    , table "Interruptions by signal" ["count", "stopping took [s]", "signal"] 2 (map interruptionRow (interruptions s))
-    , table "Failures by path" ["count", "path"] 1 (map failureRow (failures s))
+    , table "Time by path" ["runs", "total [s]", "median [s]", "longest [s]", "outcomes", "path"] 4 timesRow (times s)
+    , table "Interruptions by signal" ["count", "stopping took [s]", "signal"] 2 interruptionRow (interruptions s)
+    , table "Failures by path" ["count", "path"] 1 failureRow (failures s)
     ]
  where
-  table title headings numbers rows
+  table title headings numbers row rows
     | null rows = [title ++ ": none"]
-    | otherwise = title : columns numbers (headings : rows)
+    | otherwise = title : columns numbers headings row rows
   timesRow (where', t) =
     [ show (runs t)
     , milliseconds (total t)
@@ -204,35 +183,3 @@ renderSummary s =
   interruptionRow (signal, i) =
     [show (interrupted i), milliseconds (stopping i), if null signal then "a signal without a name" else nameText signal]
   failureRow (where', what, n) = [show n, renderPath where' ++ ": " ++ what]
-
--- | The path on one line. Of a long one the middle is left out.
---
--- >>> putStrLn (renderPath (path ["mission", "survey"]))
--- mission > survey
---
--- @since 0.1.0.0
-renderPath :: Path -> String
-renderPath (Path names)
-  | more > 1 = intercalate " > " (shown (drop (8 + more) names) ++ ["... (" ++ show more ++ " more)"] ++ shown (take 8 names))
-  | otherwise = intercalate " > " (shown names)
- where
-  more = length names - 12
-  shown = map nameText . reverse
-
--- | The lines of a table with its headings. The given number of columns are numbers, and aligned to
--- the right.
---
--- >>> mapM_ putStrLn (columns 1 [["runs", "path"], ["12", "mission"]])
---   runs  path
---     12  mission
---
--- @since 0.1.0.0
-columns :: Int -> [[String]] -> [String]
-columns numbers rows = map (foldr (\cell after -> "  " ++ cell ++ after) "" . zipWith3 pad [0 ..] widths) rows
- where
-  widths = map (maximum . map length) (transpose rows)
-  lastColumn = length widths - 1
-  pad i width text
-    | i < numbers = replicate (width - length text) ' ' ++ text
-    | i == lastColumn = text
-    | otherwise = text ++ replicate (width - length text) ' '

@@ -67,34 +67,44 @@ data Placed = Placed
   -- ^ The reaction that stopped it stopped its parent too.
   }
 
--- A span, and those that it is in.
+-- A span, and what it is in: its parent's number and the reaction that stopped that.
 data Nested = Nested
-  { interval :: (Integer, Integer)
-  , nested :: Node
-  , outside :: [Int]
-  , outsideStoppedBy :: Maybe Int
+  { interval :: !(Integer, Integer)
+  , nested :: !Node
+  , parent :: !(Maybe Int)
+  , parentStoppedBy :: !(Maybe Int)
+  , position :: !Int
+  -- ^ In the order in which each span comes before those in it.
+  , lastInside :: !Int
+  -- ^ The position of the last span in it, or its own.
   }
+
+-- | The first one is in the second one.
+isIn :: Nested -> Nested -> Bool
+isIn n m = position m < position n && position n <= lastInside m
 
 -- | All spans in their lanes, in the order in which they begin. A span is in the lane of its parent,
 -- unless a sibling is there at that time or the span lasts longer than its parent.
 --
 -- @since 0.1.0.0
 placed :: Recording -> [Placed]
-placed r = reverse (placedSpans (foldl' place (Lanes IntMap.empty Set.empty IntMap.empty []) ordered))
+placed r = reverse (placedSpans (foldl' place (Lanes 0 IntMap.empty Set.empty IntMap.empty []) ordered))
  where
   -- Of those that begin at the same time, a span comes before those in it.
-  ordered = sortOn (fst . interval) (concatMap (below [] Nothing) (roots r))
-  below outer stopping n =
-    Nested (begin, max begin (nanoseconds (nodeUntil r n) - start)) n outer stopping
-      : concatMap (below (spanNumber (nodeSpan n) : outer) (stoppedBy n)) (nodeChildren n)
+  ordered = sortOn (fst . interval) (snd (foldr (within Nothing Nothing) (0, []) (roots r)))
+  -- From the last span to the first: its position is the one before that of the first span in it.
+  within outer stopping n (next, rest) = (here, Nested (begin, max begin end) n outer stopping here (next - 1) : inner)
    where
+    (after, inner) = foldr (within (Just (spanNumber (nodeSpan n))) (stoppedBy n)) (next, rest) (nodeChildren n)
+    here = after - 1
     begin = nanoseconds (spanBegan (nodeSpan n)) - start
+    end = nanoseconds (nodeUntil r n) - start
   start = nanoseconds (from r)
 
--- In each lane, the spans that have begun and not ended: the innermost first, with its number and
--- its end. And when each lane becomes free.
+-- In each lane, the spans that have begun and not ended, the innermost first. And when each lane becomes free.
 data Lanes = Lanes
-  { open :: !(IntMap [(Int, Integer)])
+  { laneCount :: !Int
+  , open :: !(IntMap [Nested])
   , freeAt :: !(Set.Set (Integer, Int))
   , laneOf :: !(IntMap Int)
   , placedSpans :: [Placed]
@@ -103,31 +113,36 @@ data Lanes = Lanes
 place :: Lanes -> Nested -> Lanes
 place lanes n =
   Lanes
-    { open = IntMap.insert chosen ((number', end) : enclosing) (open lanes)
+    { laneCount = max chosen (laneCount lanes)
+    , open = IntMap.insert chosen (n : enclosing) known
     , freeAt = if null enclosing then Set.insert (end, chosen) (forget (freeAt lanes)) else freeAt lanes
-    , laneOf = IntMap.insert number' chosen (laneOf lanes)
-    , placedSpans = Placed chosen begin end (nested n) (fst <$> listToMaybe enclosing) inside : placedSpans lanes
+    , laneOf = IntMap.insert (numberOf n) chosen (laneOf lanes)
+    , placedSpans = Placed chosen begin end (nested n) (numberOf <$> listToMaybe enclosing) inside : placedSpans lanes
     }
  where
   (begin, end) = interval n
-  number' = spanNumber (nodeSpan (nested n))
-  inside = maybe False ((== outsideStoppedBy n) . Just) (stoppedBy (nested n))
-  (chosen, enclosing) = case parentLane of
-    Just l | fits (openIn l) -> (l, openIn l)
-    _ -> case Set.lookupMin (freeAt lanes) of
-      Just (time, l) | time <= begin -> (l, [])
-      _ -> (IntMap.size (open lanes) + 1, [])
-  parentLane = listToMaybe (outside n) >>= \parent -> IntMap.lookup parent (laneOf lanes)
-  openIn l = dropWhile over (IntMap.findWithDefault [] l (open lanes))
+  numberOf = spanNumber . nodeSpan . nested
+  inside = maybe False ((== parentStoppedBy n) . Just) (stoppedBy (nested n))
+  (chosen, enclosing, known) = case parent n >>= (`IntMap.lookup` laneOf lanes) of
+    Just l
+      | fits here -> (l, here, open lanes)
+      -- (What is over is looked at once.)
+      | (l', around) <- free -> (l', around, IntMap.insert l here (open lanes))
+     where
+      here = dropWhile over (IntMap.findWithDefault [] l (open lanes))
+    Nothing | (l, around) <- free -> (l, around, open lanes)
+  free = case Set.lookupMin (freeAt lanes) of
+    Just (time, l) | time <= begin -> (l, [])
+    _ -> (laneCount lanes + 1, [])
   -- What begins when the span that it ran in ends is in it.
-  over (m, mEnd) = mEnd < begin || mEnd == begin && (end > begin || m `notElem` outside n)
+  over m = let e = snd (interval m) in e < begin || e == begin && (end > begin || not (n `isIn` m))
   -- In no other span than those that it really ran in.
   fits [] = True
-  fits ((m, mEnd) : _) = m `elem` outside n && end <= mEnd
+  fits (m : _) = n `isIn` m && end <= snd (interval m)
   -- The lane is no longer free from when it was.
-  forget free = case IntMap.lookup chosen (open lanes) of
-    Just known | not (null known) -> Set.delete (snd (last known), chosen) free
-    _ -> free
+  forget = case IntMap.lookup chosen (open lanes) of
+    Just around@(_ : _) -> Set.delete (snd (interval (last around)), chosen)
+    _ -> id
 
 -- | The same spans with times that tell which is in which: in each lane, no two times are equal.
 apart :: [Placed] -> [Placed]

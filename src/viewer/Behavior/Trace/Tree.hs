@@ -4,7 +4,6 @@ module Behavior.Trace.Tree
   ( renderTree
   ) where
 
-import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (sortOn)
 import Data.Maybe (listToMaybe)
@@ -32,37 +31,30 @@ import Behavior.Trace.Recording
 --
 -- @since 0.1.0.0
 renderTree :: Recording -> String
-renderTree r = unlines (heading : concatMap snd (sortOn fst (loose ++ map (branch 0) (roots r))) ++ remark)
+renderTree r = unlines (heading : inOrder (map (reaction 0) loose ++ map (branch 0) (roots r)) remark)
  where
   heading = row "begin [s]" "took [s]" ""
-  branch :: Int -> Node -> (Seconds, [String])
+  branch :: Int -> Node -> Part
   branch depth node =
     ( spanBegan s
-    , row (milliseconds (spanBegan s)) (milliseconds (nodeUntil r node - spanBegan s)) (indented depth (title node))
-        : concatMap snd (sortOn fst (reacted (depth + 1) (spanNumber s) ++ map (branch (depth + 1)) (nodeChildren node)))
+    , (row (milliseconds (spanBegan s)) (milliseconds (nodeUntil r node - spanBegan s)) (indented depth (title node)) :)
+        . inOrder (map (reaction (depth + 1)) (IntMap.findWithDefault [] (spanNumber s) inside) ++ map (branch (depth + 1)) (nodeChildren node))
     )
    where
     s = nodeSpan node
-  reacted depth n = map (reaction depth) (IntMap.findWithDefault [] n inside)
-  reaction depth x =
-    (reactionTime x, [row (milliseconds (reactionTime x)) "" (indented depth ("! " ++ described x))])
+  reaction depth x = (reactionTime x, (row (milliseconds (reactionTime x)) "" (indented depth ("! " ++ described x)) :))
   described x = reactionText [(spanName s, spanBegan s) | s <- stopped] (spanName <$> listToMaybe started) x
    where
     (stopped, started) = IntMap.findWithDefault ([], []) (reactionNumber x) involved
   involved = reactionSpans r
-  -- Those of no span that is known.
-  loose = map (reaction 0) (IntMap.findWithDefault [] 0 inside)
-  inside = reactionsInside r
+  (loose, inside) = reactionsInside r
   remark = [lostRemark (lost r) | lost r /= 0]
 
--- | The reactions by the number of the span in which their operator ran; 0: in none that is known.
-reactionsInside :: Recording -> IntMap [Reaction]
-reactionsInside r = IntMap.fromListWith (++) [(parent x, [x]) | x <- reverse (reactions r)]
- where
-  parent x = case reactionParent x of
-    Inside n | IntMap.member n known -> n
-    _ -> 0
-  known = IntMap.fromList [(spanNumber (nodeSpan node), ()) | node <- nodes r]
+-- When it was, and its lines, before those that follow. (Lists of lines would be copied at each level.)
+type Part = (Seconds, [String] -> [String])
+
+inOrder :: [Part] -> [String] -> [String]
+inOrder parts rest = foldr snd rest (sortOn fst parts)
 
 title :: Node -> String
 title node = nameText (spanName s) ++ ": " ++ outcome (snd <$> nodeEnd node) ++ kind ++ origin
