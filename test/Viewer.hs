@@ -9,6 +9,7 @@ import qualified Viewer.InterruptionSpec
 import qualified Viewer.OutputSpec
 import qualified Viewer.PictureSpec
 import qualified Viewer.PlainLinesSpec
+import qualified Viewer.RecordingSpec
 import qualified Viewer.SimulatedSpec
 import qualified Viewer.SummarySpec
 import qualified Viewer.SvgSpec
@@ -18,6 +19,7 @@ import qualified Viewer.ToolSpec
 import qualified Viewer.TraceEventsSpec
 import qualified Viewer.TreeSpec
 import qualified Viewer.ViewingSpec
+import qualified Viewer.WorkSpec
 
 main :: IO ()
 main = hspec $ do
@@ -25,6 +27,7 @@ main = hspec $ do
     Viewer.FileSpec.spec
     Viewer.FormatSpec.spec
   describe "An event as a line of text" Viewer.PlainLinesSpec.spec
+  describe "A recording" Viewer.RecordingSpec.spec
   describe "The tree" Viewer.TreeSpec.spec
   describe "The tree in the terminal" Viewer.TerminalSpec.spec
   describe "What a program prints while the tree is in the terminal" Viewer.OutputSpec.spec
@@ -39,3 +42,4 @@ main = hspec $ do
   describe "Texts of others" Viewer.TextSpec.spec
   describe "Viewing" Viewer.ViewingSpec.spec
   describe "behavior-trace" Viewer.ToolSpec.spec
+  describe "Work" Viewer.WorkSpec.spec

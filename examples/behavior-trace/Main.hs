@@ -2,10 +2,13 @@
 -- Shows the file of a trace.
 module Main (main) where
 
+import Control.Exception (displayException, try)
+import GHC.IO.Exception (IOErrorType (..), IOException (..))
 import System.Environment (getArgs)
-import System.Exit (exitWith)
+import System.Exit (ExitCode (..), exitWith)
 import System.IO
 
+import Behavior.Trace.Describe (inert)
 import Tool
 
 main :: IO ()
@@ -14,7 +17,14 @@ main = do
   encoding <- mkTextEncoding (show localeEncoding ++ "//TRANSLIT")
   mapM_ (`hSetEncoding` encoding) [stdout, stderr]
   (status, printed, remarks) <- getArgs >>= run
-  hPutStr stderr remarks
-  putStr printed
-  hFlush stdout
-  exitWith status
+  -- (If this fails, there is nothing to report it on.)
+  _ <- attempt (hPutStr stderr remarks)
+  written <- attempt (putStr printed >> hFlush stdout)
+  case written of
+    -- The reader of a pipe has closed it: it has what it wants.
+    Left e | ioe_type e /= ResourceVanished -> do
+      _ <- attempt (hPutStrLn stderr (inert (displayException e)))
+      exitWith (ExitFailure 2)
+    _ -> exitWith status
+ where
+  attempt act = try act :: IO (Either IOException ())

@@ -7,10 +7,9 @@ module Tool
   ( run
   ) where
 
-import Control.Exception (IOException, displayException, try)
+import Control.Exception (IOException, displayException, evaluate, try)
 import Control.Monad (when)
 import Control.Monad.Trans.Except (ExceptT (..), runExceptT, throwE)
-import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Lazy as Lazy
 import Data.Text.Lazy.Encoding (encodeUtf8)
 import Options.Applicative
@@ -60,8 +59,8 @@ commandLine =
       <> failureCode 2
       <> progDesc "Shows what a robot did, since when, and what interrupted it."
       <> footer
-        "Exit status: 0, or 2 if the options are wrong or a file cannot be read or written. A last line \
-        \that is incomplete, because the program was killed, is no error."
+        "Exit status: 0, or 2 if the options are wrong or a file or the output cannot be read or written. A last line \
+        \that is incomplete, because the program was killed, is no error, nor is a pipe that its reader closed."
 
 modes :: Parser Mode
 modes =
@@ -88,8 +87,9 @@ perform file mode events remarks = case mode of
 -- The events of a file, and a remark if its last line is incomplete.
 load :: FilePath -> ExceptT String IO ([Event], [String])
 load file = do
-  content <- attempt (Strict.readFile file)
-  case parseTrace (Lazy.fromStrict content) of
+  -- It is read while it is parsed, so that it is never in memory as a whole.
+  parsed <- attempt (Lazy.readFile file >>= evaluate . parseTrace)
+  case parsed of
     Left problem -> throwE (inert file ++ ": " ++ explainTraceError problem)
     Right (_, events, torn) -> pure (events, maybe [] (pure . remark) torn)
  where

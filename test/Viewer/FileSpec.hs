@@ -20,8 +20,13 @@ import Test.QuickCheck
 import Behavior.Sim (Outcome (..), outcome, simulate)
 import Behavior.Time (now, sleep)
 import Behavior.Trace
+import Behavior.Trace.Diff (difference, renderDifference)
 import Behavior.Trace.File
 import Behavior.Trace.Format (decodeEvent)
+import Behavior.Trace.Recording (recording, withoutOperators)
+import Behavior.Trace.Summary (renderSummary, summary)
+import Behavior.Trace.Svg (timeline)
+import Behavior.Trace.Tree (renderTree)
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
@@ -117,10 +122,13 @@ spec = do
       forM_ [take 6 mission, detailed] $ \events ->
         forM_ [0 .. Bytes.length (renderTrace header events)] $ \n ->
           quickCheckWithResult stdArgs {maxSuccess = 1, chatty = False} (truncated events n) >>= (`shouldSatisfy` isSuccess)
-    it "can end with an incomplete line that has a newline, or with zeros" $ do
+    it "can end with an incomplete line, or with zeros" $ do
       let torn end = fmap (\(_, events, line) -> (events, line)) (parseTrace (renderTrace header [Lost 1] <> end))
-      torn "{\"event\":\"lo\n" `shouldBe` Right ([Lost 1], Just (TornLine 3 12))
+      torn "{\"event\":\"lo" `shouldBe` Right ([Lost 1], Just (TornLine 3 12))
       torn "\NUL\NUL\NUL" `shouldBe` Right ([Lost 1], Just (TornLine 3 3))
+    it "is refused with a last line that is complete, and is no JSON" $
+      forM_ ["{\"event\":\"lo\n", "\n", "\NUL\n"] $ \end ->
+        problem (renderTrace header [Lost 1] <> end) `shouldStartWith` "line 3: this is not a line of JSON: "
     it "is refused with the line in the middle that is no JSON" $
       problem (renderTrace header [Lost 1] <> "{\"event\":\"lo\n" <> "{\"event\":\"lost\",\"count\":1}\n")
         `shouldStartWith` "line 3: this is not a line of JSON: "
@@ -132,6 +140,14 @@ spec = do
     it "is refused when a field is missing or has another type" $
       forM_ ["{\"event\":\"lost\"}", "{\"event\":\"lost\",\"count\":\"2\"}", "{\"event\":\"lost\",\"count\":1e400}", "{\"event\":\"began\",\"number\":1,\"parent\":null,\"kind\":\"named\",\"name\":\"x\",\"began\":0}", "[]", "7"] $ \line ->
         problem (renderTrace header [] <> line <> "\n") `shouldStartWith` "line 2: this is no event: "
+    it "is refused when a span or a reaction is in itself, in a later one, or has a number below 1" $
+      forM_ [(1, 1), (1, 2), (3, 3), (3, 4), (3, 0), (3, -1), (0, -1), (maxBound, maxBound)] $ \(n, parent) ->
+        forM_ [Began (Span n (Inside parent) Operator "x" 0 Nothing), Ended (Span n (Inside parent) Named "x" 0 Nothing) 1 Succeeded, Reacted (Reaction n (Inside parent) "x" 0 [] Nothing Nothing)] $ \event ->
+          problem (renderTrace header [event]) `shouldSatisfy` \why -> all (`isInfixOf` why) ["line 2: this is no event: ", "; allowed: "]
+    it "is refused when no events, fewer, or more than can be counted were lost" $ do
+      forM_ [0, -1, minBound] $ \n -> problem (renderTrace header [Lost n]) `shouldSatisfy` isInfixOf "line 2: this is no event: "
+      parseTrace (renderTrace header [Lost (maxBound - 1), Lost 1]) `shouldBe` Right (header, [Lost (maxBound - 1), Lost 1], Nothing)
+      problem (renderTrace header [Lost maxBound, Began (Span 1 Top Named "x" 0 Nothing), Lost 1]) `shouldStartWith` "line 4: "
     it "is refused when it is empty" $ problem "" `shouldStartWith` "line 1: the file is empty; allowed: "
     it "is refused when it is something else" $ do
       forM_ ["hello\nworld", "\NUL\ESC[2J\255", "{}", "{\"format\":\"speedscope\"}\n", "[1,2]\n", "\n"] $ \content ->
@@ -148,8 +164,23 @@ spec = do
           (start, rest) = Bytes.splitAt (position `mod` Bytes.length content) content
           changed = start <> Bytes.pack bytes <> Bytes.drop (fromIntegral (length bytes)) rest
       in ioProperty (True <$ evaluate (either (length . explainTraceError) (\(h, es, torn) -> length (show (h, es, torn))) (parseTrace changed)))
-    it "is refused when a line has a million opening brackets" $
-      problem (renderTrace header [] <> Bytes.replicate 1000000 '[' <> "\n" <> encodedLost) `shouldStartWith` "line 2: "
+    it "is refused when a line has a million opening brackets, also the last one, before it is parsed" $
+      forM_ [Bytes.replicate 1000000 '[', mconcat (replicate 1000000 "{\"x\":")] $ \line ->
+        forM_ ["", "\n", "\n" <> encodedLost] $ \end ->
+          problem (renderTrace header [] <> line <> end) `shouldStartWith` "line 2: this is no event: it nests deeper than 100; allowed: "
+    it "is read when the texts of a line have brackets, and when a field that is not known nests a little" $ do
+      let events = [Began (Span 1 Top Named (concat (replicate 1000 "[{\"\\")) 0 Nothing)]
+      parseTrace (renderTrace header events) `shouldBe` Right (header, events, Nothing)
+      fmap (\(_, found, _) -> found) (parseTrace (renderTrace header [] <> "{\"x\":" <> Bytes.replicate 50 '[' <> Bytes.replicate 50 ']' <> ",\"event\":\"lost\",\"count\":1}\n"))
+        `shouldBe` Right [Lost 1]
+    it "is read or refused, and shown in every way, whichever byte is another one" . withMaxSuccess 20 . property $ \byte ->
+      let content = renderTrace header detailed
+          changed n = Bytes.take n content <> Bytes.cons byte (Bytes.drop (n + 1) content)
+          shown events = concat [renderTree r, renderSummary (summary r), renderDifference (difference r r), Text.unpack (timeline r), concatMap plainLine events]
+           where
+            r = recording (withoutOperators events)
+      in forAll (choose (0, Bytes.length content - 1)) $ \n ->
+          ioProperty (True <$ evaluate (either (length . explainTraceError) (\(_, events, _) -> length (shown events)) (parseTrace (changed n))))
     it "is read when it has fields that are not known" $
       fmap (\(_, events, _) -> events) (parseTrace (renderTrace header [] <> "{\"event\":\"lost\",\"colour\":[],\"count\":1}\n"))
         `shouldBe` Right [Lost 1]

@@ -18,19 +18,34 @@ import Behavior.Time (Seconds)
 import Behavior.Trace
 import Viewer.Examples
 
--- | Any event: any text, any time but NaN.
+-- | Any event that a file can contain: any text, any time but NaN.
 newtype AnyEvent = AnyEvent Event
   deriving (Show)
 
 instance Arbitrary AnyEvent where
-  arbitrary = AnyEvent <$> anEvent arbitrary anyTime oddText
+  arbitrary = AnyEvent . undamaged <$> anEvent arbitrary anyTime oddText
 
 newtype AnyEvents = AnyEvents [Event]
   deriving (Show)
 
 instance Arbitrary AnyEvents where
-  arbitrary = AnyEvents <$> listOf (anEvent arbitrary anyTime oddText)
+  arbitrary = AnyEvents . map undamaged <$> listOf (anEvent arbitrary anyTime oddText)
   shrink (AnyEvents events) = map AnyEvents (shrinkList (const []) events)
+
+-- The event with a number from 1, and a parent that has a smaller one.
+undamaged :: Event -> Event
+undamaged event = case event of
+  Began s -> Began (inSpan s)
+  Ended s t end -> Ended (inSpan s) t end
+  Reacted r -> let n = from1 (reactionNumber r) in Reacted r {reactionNumber = n, reactionParent = below n (reactionParent r)}
+  Lost n -> Lost (from1 n)
+ where
+  inSpan s = let n = from1 (spanNumber s) in s {spanNumber = n, spanParent = below n (spanParent s)}
+  from1 n = 1 + n `mod` 1000000
+  below n parent = case parent of
+    Inside _ | n == 1 -> Top
+    Inside p -> Inside (1 + p `mod` (n - 1))
+    _ -> parent
 
 -- | Events of few spans and reactions, at few times: so spans overlap, touch, are in each other,
 -- last longer than their parents, and are stopped and started by reactions. The name of a span is

@@ -285,6 +285,7 @@ inertUpTo limit text = case splitAt limit (map harmless (take (limit + 1) text))
   (known, _) -> take (limit - 1) known ++ "…"
  where
   harmless c
+    | c >= ' ' && c < '\DEL' = c
     | c `elem` "\n\r\t" = ' '
     | otherwise = case generalCategory c of
         Control -> '\xFFFD'

@@ -1,3 +1,4 @@
+{-# LANGUAGE BangPatterns #-}
 {-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE OverloadedStrings #-}
 
@@ -44,6 +45,7 @@ import Behavior.Time (Seconds, now)
 import Behavior.Trace
 import Behavior.Trace.Describe (inertUpTo)
 import Behavior.Trace.Format
+import Behavior.Trace.Sharing
 
 -- $setup
 -- >>> import Behavior.Trace
@@ -174,20 +176,22 @@ parseTrace bytes = case Bytes.split '\n' bytes of
   [] -> Left EmptyFile
   first : rest -> do
     header <- decodeHeader (null rest) first
-    (events, torn) <- go 2 [] rest
+    (events, torn) <- go 2 noTexts 0 [] rest
     pure (header, events, torn)
  where
-  -- The last element is what follows the last newline.
-  go :: Int -> [Event] -> [Bytes.ByteString] -> Either TraceError ([Event], Maybe TornLine)
-  go n before = \case
+  -- The last element is what follows the last newline: only that can be incomplete.
+  go :: Int -> Texts -> Int -> [Event] -> [Bytes.ByteString] -> Either TraceError ([Event], Maybe TornLine)
+  go !n !texts !lostBefore before = \case
     [] -> Right (reverse before, Nothing)
     [end] | Bytes.null end -> Right (reverse before, Nothing)
     content : after -> case decodeEvent content of
-      Right this -> go (n + 1) (this : before) after
-      Left (NotJson _) | all Bytes.null after, length (take 2 after) < 2 ->
-        Right (reverse before, Just (TornLine n (fromIntegral (Bytes.length content))))
+      Right (Lost more) | more > maxBound - lostBefore -> Left (DamagedLine n "more events were lost than can be counted")
+      Right this | (this', texts') <- sharing texts this -> go (n + 1) texts' (lostBefore + lostIn this) (this' : before) after
+      Left (NotJson _) | null after -> Right (reverse before, Just (TornLine n (fromIntegral (Bytes.length content))))
       Left (NotJson why) -> Left (DamagedLine n ("this is not a line of JSON: " ++ why))
       Left (NotAnEvent why) -> Left (DamagedLine n ("this is no event: " ++ why))
+  lostIn (Lost n) = n
+  lostIn _ = 0
 
 decodeHeader :: Bool -> Bytes.ByteString -> Either TraceError Header
 decodeHeader isLast first = case eitherDecode first of
@@ -197,7 +201,8 @@ decodeHeader isLast first = case eitherDecode first of
       if number' < 1 then Left (damaged "version: allowed: 1") else Left (OtherVersion number')
     zero <- field o "zero"
     maybe (Left (damaged "zero: allowed: a time such as \"2026-01-31T12:00:00Z\"")) (Right . Header) (iso8601ParseM zero)
-  Left _ | isLast, begin `Bytes.isPrefixOf` first || first `Bytes.isPrefixOf` begin -> Left TornHeader
+  -- (Of a device that never ends, the end of its first line is not looked for.)
+  Left _ | begin `Bytes.isPrefixOf` first || first `Bytes.isPrefixOf` begin, isLast -> Left TornHeader
   Left why | begin `Bytes.isPrefixOf` first -> Left (damaged why)
   _ -> Left (ForeignFile (decodedText (Bytes.take 200 first)))
  where

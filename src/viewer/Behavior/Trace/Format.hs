@@ -16,12 +16,13 @@ module Behavior.Trace.Format
   , NoEvent (..)
   ) where
 
-import Control.Monad ((>=>))
+import Control.Monad (when)
 import Data.Aeson (Object, Value (..), eitherDecode, parseJSON, withObject, withText, (.:), (.:?))
 import Data.Aeson.Encoding (Encoding, Series, int, list, pair, pairs)
 import Data.Aeson.Types (Key, Parser, parseEither)
 import Data.ByteString.Builder (Builder, char7)
 import qualified Data.ByteString.Lazy as Bytes
+import qualified Data.ByteString.Lazy.Char8 as Char8
 import Data.List (intercalate)
 import Data.Maybe (fromMaybe)
 import qualified Data.Text as Text
@@ -159,7 +160,33 @@ data NoEvent
 --
 -- @since 0.1.0.0
 decodeEvent :: Bytes.ByteString -> Either NoEvent Event
-decodeEvent = either (Left . NotJson) Right . eitherDecode >=> either (Left . NotAnEvent) Right . parseEither event
+decodeEvent content
+  | nestsDeeperThan 100 content = Left (NotAnEvent "it nests deeper than 100; allowed: an event, which nests 6 deep")
+  | otherwise = either (Left . NotJson) Right (eitherDecode content) >>= either (Left . NotAnEvent) Right . parseEither event
+
+-- (A parser needs a few hundred bytes of memory for each bracket.)
+nestsDeeperThan :: Int -> Bytes.ByteString -> Bool
+nestsDeeperThan limit content =
+  Char8.count '[' content + Char8.count '{' content > fromIntegral limit && deepest (Char8.foldl' next (Outside 0 0) content) > limit
+ where
+  next state c = case state of
+    Outside d m
+      | c == '[' || c == '{' -> Outside (d + 1) (max m (d + 1))
+      | c == ']' || c == '}' -> Outside (d - 1) m
+      | c == '"' -> Within d m
+      | otherwise -> state
+    Within d m
+      | c == '"' -> Outside d m
+      | c == '\\' -> Escaped d m
+      | otherwise -> state
+    Escaped d m -> Within d m
+  deepest state = case state of
+    Outside _ m -> m
+    Within _ m -> m
+    Escaped _ m -> m
+
+-- How deep it is there, and at the deepest place before: outside of a text, within one, or after its backslash.
+data Nesting = Outside !Int !Int | Within !Int !Int | Escaped !Int !Int
 
 event :: Value -> Parser Event
 event = withObject "an event" $ \o ->
@@ -167,14 +194,12 @@ event = withObject "an event" $ \o ->
     [ ("began", Began <$> spanOf o)
     , ("ended", Ended <$> spanOf o <*> (o .: "ended" >>= secondsOf) <*> (o .: "end" >>= endOf))
     , ("reacted", Reacted <$> reactionOf o)
-    , ("lost", Lost <$> o .: "count")
+    , ("lost", Lost <$> (o .: "count" >>= from1 "count"))
     ]
 
 spanOf :: Object -> Parser Span
 spanOf o =
-  Span
-    <$> o .: "number"
-    <*> (o .: "parent" >>= parentOf)
+  uncurry Span <$> numbered o
     <*> choose o "kind" [(name, pure kind) | (name, kind) <- kinds]
     <*> o .: "name"
     <*> (o .: "began" >>= secondsOf)
@@ -182,14 +207,24 @@ spanOf o =
 
 reactionOf :: Object -> Parser Reaction
 reactionOf o =
-  Reaction
-    <$> o .: "number"
-    <*> (o .: "parent" >>= parentOf)
+  uncurry Reaction <$> numbered o
     <*> o .: "operator"
     <*> (o .: "time" >>= secondsOf)
     <*> (o .: "changes" >>= traverse changeOf)
     <*> (o .:? "stopped" >>= traverse stoppedOf)
     <*> o .:? "starts"
+
+-- What something is in began before it. So nothing is in itself.
+numbered :: Object -> Parser (Int, Parent)
+numbered o = do
+  n <- o .: "number" >>= from1 "number"
+  parent <- o .: "parent" >>= parentOf
+  case parent of
+    Inside p | p < 1 || p >= n -> fail ("parent is " ++ show p ++ "; allowed: a number from 1 that is less than its own, " ++ show n)
+    _ -> pure (n, parent)
+
+from1 :: String -> Int -> Parser Int
+from1 key n = n <$ when (n < 1) (fail (key ++ " is " ++ show n ++ "; allowed: a whole number from 1"))
 
 parentOf :: Value -> Parser Parent
 parentOf = \case

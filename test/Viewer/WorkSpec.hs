@@ -1,0 +1,89 @@
+-- |
+-- How much work each view takes: it is counted in bytes that are allocated, not in seconds.
+module Viewer.WorkSpec (spec) where
+
+import Control.Exception (evaluate)
+import Control.Monad (forM_)
+import qualified Data.ByteString.Lazy as Bytes
+import Data.Int (Int64)
+import Data.List (foldl')
+import qualified Data.Text.Lazy as Text
+import System.Mem (getAllocationCounter, setAllocationCounter)
+import Test.Hspec
+
+import Behavior.Time (Seconds)
+import Behavior.Trace
+import Behavior.Trace.Diff
+import Behavior.Trace.File
+import Behavior.Trace.Recording
+import Behavior.Trace.Summary (renderSummary, summary)
+import Behavior.Trace.Svg
+import Behavior.Trace.Terminal
+import Behavior.Trace.TraceEvents
+import Behavior.Trace.Tree
+import Viewer.Examples
+
+spec :: Spec
+spec = do
+  describe "Twice as many events take about twice as much work (if not four times)" . forM_ shapes $ \(shape, made) ->
+    describe shape . forM_ views $ \(view, work) -> it view $ do
+      -- (Logarithms make it a little more than two.)
+      [less, more] <- mapM (\n -> allocatedBy work (made n)) [2000, 4000]
+      fromIntegral more / fromIntegral less `shouldSatisfy` (< (2.5 :: Double))
+  describe "A hundred thousand spans in each other" . forM_ views $ \(view, work) ->
+    it view $ evaluate (work (inEachOther 100000 Named Succeeded)) >>= (`shouldSatisfy` (> 0))
+  it "A hundred thousand operators in each other leave the spans with names" $
+    length (withoutOperators (inEachOther 100000 Operator Succeeded ++ ended 100001 (Inside 100000) "drive" 0 Nothing 1 Succeeded))
+      `shouldBe` 4
+
+-- Events in which something is of this size.
+shapes :: [(String, Int -> [Event])]
+shapes =
+  [ ("spans in each other", \n -> inEachOther n Named Succeeded)
+  , ("spans in each other, all of which fail", \n -> inEachOther n Named (FailedWith "no"))
+  , ("operators in each other", \n -> inEachOther n Operator Succeeded)
+  , ("spans in each other that one reaction stops", \n -> inEachOther n Named (StoppedBy (SignalChanged (n + 1) [])) ++ [reaction (n + 1) 1])
+  , ("spans in each other that each outlast the one around", \n -> concat [ended k (outside k) "on" (fromIntegral k) Nothing (fromIntegral (n + k)) Succeeded | k <- [1 .. n]])
+  , ("spans in each other, each with another one at the same time", \n -> concat [ended (2 * k - 1) (if k == 1 then Top else Inside (2 * k - 3)) "on" (time k) Nothing (2 * time n - time k) Succeeded ++ ended (2 * k) (Inside (2 * k - 1)) "beside" (time k) Nothing (time (k + 2)) Succeeded | k <- [1 .. n `div` 2]])
+  , ("spans after each other", \n -> concat [ended k Top "next" (time k) Nothing (time (k + 1)) Succeeded | k <- [1 .. n]])
+  , ("spans at the same time", sideBySide)
+  , ("interruptions after each other", interrupted)
+  , ("reactions", \n -> ended 1 Top "wait" 0 Nothing (time n) Succeeded ++ [reaction k 1 | k <- [2 .. n]])
+  , ("losses", \n -> replicate n (Lost 1))
+  ]
+ where
+  time = fromIntegral :: Int -> Seconds
+  reaction k p = Reacted (Reaction k (Inside p) "monitor" (time k) [Change "battery" Nothing (show k)] (Just (StoppedBranch "task" 1 0 Succeeded)) Nothing)
+
+-- The outermost one has a name.
+inEachOther :: Int -> SpanKind -> End -> [Event]
+inEachOther n kind end = map Began spans ++ [Ended s (fromIntegral (2 * n - spanNumber s)) end | s <- reverse spans]
+ where
+  spans = [Span k (outside k) (if k == 1 then Named else kind) "on" (fromIntegral k) Nothing | k <- [1 .. n]]
+
+outside :: Int -> Parent
+outside k = if k == 1 then Top else Inside (k - 1)
+
+-- Each makes all of what is shown, and counts it.
+views :: [(String, [Event] -> Int64)]
+views =
+  [ ("the tree", size . renderTree . recording)
+  , ("the summary", size . renderSummary . summary . recording)
+  , ("the differences", \events -> let r = recording events in size (renderDifference (difference r r)))
+  , ("the differences from nothing", \events -> size (renderDifference (difference (recording []) (recording events))))
+  , ("the trace-event format", Bytes.length . renderTraceEvents . recording)
+  , ("the timeline", Text.length . timeline . recording)
+  , ("the lines", size . concatMap plainLine)
+  , ("the tree in the terminal", \events -> size (concatMap plain (treeLines 50 100 0 (foldl' watch nothingYet events))))
+  , ("the file", either (const 0) (\(_, events, _) -> fromIntegral (length events)) . parseTrace . renderTrace header)
+  , ("without operators", fromIntegral . length . show . withoutOperators)
+  ]
+ where
+  size = fromIntegral . length
+
+allocatedBy :: (a -> Int64) -> a -> IO Int64
+allocatedBy work made = do
+  _ <- evaluate (work made)
+  setAllocationCounter 0
+  _ <- evaluate (work made)
+  negate <$> getAllocationCounter
