@@ -5,6 +5,7 @@ import System.Environment (getArgs)
 import System.Exit (die)
 
 import qualified Abandons
+import qualified AllocationLimits
 import qualified DeadCleanup
 import qualified EveryThread
 import qualified IndirectThrow
@@ -21,6 +22,7 @@ import qualified SharedFilters
 import qualified SimGhc
 import qualified SimReality
 import qualified StuckMasked
+import qualified SinkStorms
 import qualified Sinks
 import qualified SlowStops
 import qualified StopsOnce
@@ -42,6 +44,7 @@ main = do
 attacks :: [(String, IO ())]
 attacks =
   [ ("Abandons", Abandons.attack)
+  , ("AllocationLimits", AllocationLimits.attack)
   , ("DeadCleanup", DeadCleanup.attack)
   , ("EveryThread", EveryThread.attack)
   , ("LateRecovery", LateRecovery.attack)
@@ -58,6 +61,7 @@ attacks =
   , ("SimReality", SimReality.attack)
   , ("StuckMasked", StuckMasked.attack)
   , ("Sinks", Sinks.attack)
+  , ("SinkStorms", SinkStorms.attack)
   , ("SlowStops", SlowStops.attack)
   , ("StopsOnce", StopsOnce.attack)
   , ("Storm", Storm.attack)
