@@ -125,8 +125,8 @@ simulatedWithEvents o schedule' = do
   report <- reverse <$> readIORef printed
   case outcome run of
     Returned m -> pure (report, Just m, events run)
-    OutOfTime -> notOver report run
-    Livelock _ -> notOver report run -- the hour would never pass
+    OutOfTime _ -> notOver report run
+    Livelock _ _ -> notOver report run -- the hour would never pass
     Faulting e -> throwIO e
     Cancelled e -> throwIO e
     other -> throwIO (ErrorCall ("the simulation: " ++ explain other))

@@ -40,7 +40,7 @@ minute act = do
  where
   shown = \case
     Returned _ -> "over"
-    OutOfTime -> "goes on"
+    OutOfTime _ -> "goes on"
     Sim.Failing e -> show e
     Sim.Faulting e -> show e
     other -> explain other

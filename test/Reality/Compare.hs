@@ -16,9 +16,8 @@ module Reality.Compare
   ) where
 
 import Control.Concurrent (yield)
-import Control.Exception (evaluate)
+import Control.Exception (Exception (..), asyncExceptionFromException, asyncExceptionToException, evaluate, throwIO, try)
 import Control.Monad (void)
-import Data.Foldable (for_)
 import Data.IORef
 import Data.Set (Set)
 import qualified Data.Set as Set
@@ -78,16 +77,26 @@ explored rule limit p
   everything = outcomesBy (randomly 1) {planSearch = Exhaustive maxBound limit, planOptions = options}
   options = defaultSimOptions {livelockLimit = 2000}
   outcomesBy plan = do
-    seen <- newIORef (Just Set.empty)
-    report <- explore plan $ \simulated' -> do
-      sofar <- readIORef seen
-      for_ sofar $ \outcomes -> do
-        run <- simulated' (rule (observed (pure ()) p))
-        writeIORef seen $ case outcome run of
-          Returned end -> Just (Set.insert end outcomes)
-          _ -> Nothing
+    seen <- newIORef Set.empty
+    report <- try . explore plan $ \simulated' -> do
+      run <- simulated' (rule (observed (pure ()) p))
+      case outcome run of
+        Returned end -> modifyIORef' seen (Set.insert end)
+        _ -> throwIO Endless
     outcomes <- readIORef seen
-    pure (if reportComplete report then (,) (reportSchedules report) <$> outcomes else Nothing)
+    pure $ case report of
+      Right whole | reportComplete whole -> Just (reportSchedules whole, outcomes)
+      Right _ -> Nothing
+      Left Endless -> Nothing
+
+-- | Ends the exploration of a program that does not end. (As a cancellation: it is no counterexample, which would be
+-- shrunk.)
+data Endless = Endless
+  deriving (Show)
+
+instance Exception Endless where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException
 
 -- | The outcomes of the given number of real runs, whose timing varies.
 inReality :: Int -> Int -> Program -> IO (Set String)

@@ -154,9 +154,9 @@ observing instrument simulated world = do
     Sim.Failing e -> returnedWith (thrown e)
     Sim.Faulting e -> returnedWith (thrown e)
     Sim.Cancelled e -> returnedWith (thrown e)
-    Sim.OutOfTime -> seen (Unknown (ticks (finished run)))
-    Sim.Deadlock _ -> Left "a deadlock, though there is an end to wait for"
-    Sim.Livelock labels -> Left ("livelock: " ++ show labels)
+    Sim.OutOfTime _ -> seen (Unknown (ticks (finished run)))
+    Sim.Deadlock _ -> seen (Unknown (ticks (finished run)))
+    Sim.Livelock labels _ -> Left ("livelock: " ++ show labels)
     Sim.BlockedOutside label' _ -> Left ("blocked outside: " ++ show label')
     Sim.ExternalWakeup waiting -> Left ("external wakeup: " ++ show waiting)
     Sim.TooSlow label' _ -> Left ("too slow: " ++ show label')

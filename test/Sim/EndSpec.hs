@@ -6,11 +6,14 @@ module Sim.EndSpec (spec) where
 
 import Control.Concurrent (forkIO, newEmptyMVar, putMVar, takeMVar)
 import Control.Concurrent.Async (cancel, withAsync)
-import Control.Concurrent.STM (retry)
+import Control.Concurrent.STM (check, retry)
 import Control.Exception hiding (Deadlock)
 import Control.Monad (forM_, forever, void, when)
-import Data.List (isInfixOf)
+import Data.Foldable (for_)
+import Data.IORef (atomicModifyIORef', newIORef)
+import Data.List (isInfixOf, isPrefixOf)
 import GHC.Clock (getMonotonicTime)
+import GHC.Conc (unsafeIOToSTM)
 import System.IO.Unsafe (unsafePerformIO)
 import Test.Hspec hiding (parallel)
 
@@ -20,6 +23,7 @@ import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
 import Behavior.Time (atomically, checkpoint)
+import Behavior.Trace (named)
 import Memory (allocatedBy)
 import Support (guarded)
 
@@ -79,12 +83,26 @@ records = do
 
 ends :: Spec
 ends = do
-  it "a run ends then, when all threads are blocked for ever" $ do
-    run <- simulateWith defaultSimOptions {endAt = 60} (sleep 5 >> atomically retry :: Behavior ())
-    (explain (outcome run), finished run) `shouldBe` ("the virtual time has come to the end that was set", 60)
-  it "a run without an end of its own ends then" $ do
-    run <- simulateWith defaultSimOptions {endAt = 60} (forever (sleep 1) :: Behavior ())
-    (explain (outcome run), finished run) `shouldBe` ("the virtual time has come to the end that was set", 60)
+  for_ [("for a transaction", atomically retry, "a transaction"), ("for the end of an infinite sleep", sleep (1 / 0), "the end of its sleep")] $
+    \(how, forEver, what) -> it ("a run that waits for ever is a deadlock, and the time goes on to the end: " ++ how) $ do
+      run <- simulateWith defaultSimOptions {endAt = 60} (sleep 5 >> forEver)
+      (lines (explain (outcome run)), finished run)
+        `shouldBe` (["deadlock: every thread waits, and nothing in the simulation will wake one", "  main waits for " ++ what], 60)
+  it "a run that is woken from outside is that, and no deadlock" $ do
+    looks <- newIORef (0 :: Int)
+    let comesTrue = unsafeIOToSTM (atomicModifyIORef' looks (\n -> (n + 1, n >= 4))) >>= check
+    run <- simulateWith defaultSimOptions {endAt = 60} (atomically comesTrue)
+    explain (outcome run) `shouldSatisfy` ("something outside of the simulation" `isPrefixOf`)
+  it "a run without an end of its own ends then, and it is told who waits for what" $ do
+    run <- simulateWith defaultSimOptions {endAt = 60} (both (forever (sleep 7) :: Behavior ()) (named "dock" (atomically retry)) :: Behavior ())
+    (lines (explain (outcome run)), finished run)
+      `shouldBe` ( [ "the virtual time has come to the end that was set"
+                   , "  main waits for its branches: both: left, both: right"
+                   , "  both: left waits for the end of its sleep"
+                   , "  both: right waits for a transaction (dock)"
+                   ]
+                 , 60
+                 )
   it "each run of an exploration has it, by endingAt" $ do
     report <- explore (randomly 20 `endingAt` 60) $ \run -> do
       made <- run (forever (sleep 1) :: Behavior ())

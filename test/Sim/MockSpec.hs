@@ -50,7 +50,7 @@ describedEnd end = case end of
   Faulting e -> "faulted " ++ show e
   Cancelled e -> "cancelled " ++ show e
   Deadlock _ -> "deadlock"
-  OutOfTime -> "out of time"
+  OutOfTime _ -> "out of time"
   _ -> "something else"
 
 calls :: Spec

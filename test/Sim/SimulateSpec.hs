@@ -159,6 +159,22 @@ mistakes = do
     run <- simulateWith defaultSimOptions {livelockLimit = 3000} (parallel (forever checkpoint) (forever checkpoint))
     explain (outcome run)
       `shouldBe` "livelock: the virtual time does not advance while these threads run: parallel: left, parallel: right"
+  it "a livelock, and which values its operators go round with" $ do
+    hot <- newTVarIO False
+    let turn = atomically . writeTVar hot
+        rules = Signal.teleoReactive [(Signal.named "hot" (Signal.watching (readTVar hot)), turn False >> sleep 1), (pure True, turn True >> sleep 1)]
+    run <- simulateWith defaultSimOptions {livelockLimit = 3000} (sleep 2 >> rules :: Behavior ())
+    case outcome run of
+      Livelock _ [circle] -> do
+        words circle `shouldSatisfy` \said -> take 2 said == ["teleoReactive", "reacted"] && read (said !! 2) > (100 :: Int)
+        unwords (drop 3 (words circle)) `shouldBe` "times, to hot True, hot False, and started rule 1, rule 2"
+        last (lines (explain (outcome run))) `shouldBe` "  " ++ circle
+      _ -> expectationFailure (explain (outcome run))
+  it "a livelock after reactions that did not cause it" $ do
+    hot <- newTVarIO False
+    let once = Signal.monitor (Signal.named "hot" (Signal.watching (readTVar hot))) (atomically (writeTVar hot False)) (sleep 1)
+    run <- simulateWith defaultSimOptions {livelockLimit = 3000} ((sleep 0.5 >> atomically (writeTVar hot True)) `both` once >> forever checkpoint :: Behavior ())
+    explain (outcome run) `shouldBe` "livelock: the virtual time does not advance while these threads run: main"
   it "a livelock of one thread" $ do
     run <- simulateWith defaultSimOptions {livelockLimit = 3000} (forever checkpoint :: Behavior ())
     explain (outcome run) `shouldContain` "livelock"

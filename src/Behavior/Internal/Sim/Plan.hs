@@ -91,7 +91,8 @@ replaying :: Schedule -> Plan
 replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 
 -- | The same plan with an end: every run is ended with 'OutOfTime' when the virtual time
--- reaches this ('endAt'). For missions that do not end by themselves.
+-- reaches this ('endAt'). For missions that do not end by themselves. (One that waits for what never
+-- comes is a 'Deadlock' all the same; if it is to end so, write @mission ||| sleep 60@.)
 --
 -- >>> import Control.Monad (forever)
 -- >>> report <- explore (randomly 100 `endingAt` 60) (\simulate -> () <$ simulate (forever (sleep 1)))

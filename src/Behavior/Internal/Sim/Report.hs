@@ -44,8 +44,9 @@ explain = \case
   Faulting e -> "it faulted: " ++ text e
   Cancelled e -> "it was cancelled: " ++ text e
   Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
-  Livelock labels -> "livelock: the virtual time does not advance while these threads run: " ++ commas labels
-  OutOfTime -> "the virtual time has come to the end that was set"
+  Livelock labels circles ->
+    intercalate "\n  " (("livelock: the virtual time does not advance while these threads run: " ++ commas labels) : circles)
+  OutOfTime waiting -> listed "the virtual time has come to the end that was set" waiting
   BlockedOutside name blocked -> show name ++ " waited outside of the simulation, " ++ waitAndAdvice blocked
   ExternalWakeup waiting ->
     listed

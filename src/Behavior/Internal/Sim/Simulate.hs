@@ -72,8 +72,9 @@ simulate = simulateWith defaultSimOptions
 -- A behaviour that does not end needs an end time:
 --
 -- >>> run <- simulateWith defaultSimOptions {endAt = 10} (forever (sleep 3))
--- >>> explain (outcome run)
--- "the virtual time has come to the end that was set"
+-- >>> putStrLn (explain (outcome run))
+-- the virtual time has come to the end that was set
+--   main waits for the end of its sleep
 -- >>> finished run
 -- 10.0
 --

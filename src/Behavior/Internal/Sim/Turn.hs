@@ -13,7 +13,7 @@ module Behavior.Internal.Sim.Turn
   , waitingTasks
   ) where
 
-import Control.Monad (void, when)
+import Control.Monad (unless, void, when)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
 import Data.Map.Strict (Map)
@@ -22,6 +22,7 @@ import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Sim.Circle
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Runtime.OsSleep
 import Behavior.Internal.Sim.Pending
@@ -39,7 +40,9 @@ choose sim me = do
   rotating <- (n >=) <$> readIORef (rotateAt sim)
   case Map.lookupMin enabledTasks of
     Nothing -> advanceTime sim >>= \advanced -> if advanced then choose sim me else pure Nothing
-    _ | n - moved > livelockLimit (options sim) -> endWith (Livelock (map taskLabel (Map.elems enabledTasks)))
+    _ | n - moved > livelockLimit (options sim) -> do
+      repeated <- circles <$> readIORef (time sim) <*> readIORef (emitted sim)
+      endWith (Livelock (map taskLabel (Map.elems enabledTasks)) repeated)
     Just (first, only)
       | Map.size enabledTasks == 1 -> run n rotating only
       | otherwise -> do
@@ -100,16 +103,17 @@ advanceTime :: Sim -> IO Bool
 advanceTime sim = do
   asleep <- readIORef (sleepers sim)
   case Map.lookupMin asleep of
-    Just ((next, _), _) | not (infinite next), next <= end -> later asleep next >>= maybe (pure False) moveTo
-    _
-      | not (infinite end) -> do
-          modifyIORef' (time sim) (max end)
-          endWith OutOfTime
-      | otherwise -> do
-          woken <- wokenFromOutside (5 :: Int)
-          waiting <- waitingTasks sim (const True)
-          endWith (if woken then ExternalWakeup waiting else Deadlock waiting)
+    Just ((next, _), _)
+      | not (infinite next), next <= end -> later asleep next >>= maybe (pure False) moveTo
+      | not (infinite next) -> atEnd OutOfTime
+    _ -> do
+      woken <- wokenFromOutside (5 :: Int)
+      atEnd (if woken then ExternalWakeup else Deadlock)
  where
+  atEnd how = do
+    waiting <- waitingTasks sim (const True)
+    unless (infinite end) (modifyIORef' (time sim) (max end))
+    endWith (how waiting)
   end = endAt (options sim)
   infinite (Seconds s) = isInfinite s
   endWith how = False <$ endRun sim (Just how)

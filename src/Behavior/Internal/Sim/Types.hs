@@ -33,8 +33,9 @@ data SimOptions = SimOptions
   { scheduled :: Schedule
   -- ^ Which thread runs when several are enabled.
   , endAt :: Seconds
-  -- ^ The virtual time at which the run is ended ('OutOfTime'), even if no thread is enabled
-  -- any more before it; infinite by default.
+  -- ^ The virtual time at which the run is ended ('OutOfTime'); infinite by default. If nothing can
+  -- run any more before it, that is a 'Deadlock' all the same, and the virtual time goes on to the
+  -- end: the record of a mock world is complete until then.
   , livelockLimit :: Int
   -- ^ After this number of scheduling points during which the virtual time does not advance, the
   -- run is ended ('Livelock'); 100,000 by default.
@@ -117,10 +118,12 @@ data Outcome a
   | -- | All threads wait, and nothing in the simulation will wake one.
     Deadlock [Waiting]
   | -- | The virtual time did not advance for more than 'livelockLimit' scheduling points; the
-    -- threads that were enabled then.
-    Livelock [Label]
-  | -- | The virtual time reached 'endAt'.
-    OutOfTime
+    -- threads that were enabled then; and for each operator that reacted again and again, to which
+    -- values, and what it started.
+    Livelock [Label] [String]
+  | -- | The virtual time reached 'endAt', and something would have gone on after it; what the threads
+    -- waited for.
+    OutOfTime [Waiting]
   | -- | This thread waited outside of the simulation, by an operation that is not this library's.
     BlockedOutside Label Blocked
   | -- | Something that is not part of the simulation changed what these threads waited for.
