@@ -9,7 +9,7 @@
 -- openly has to avoid them, or to hide them.
 --
 -- * "Behavior": attempt, both, failed, fallback, monitor, parallel, sleep
--- * "Behavior.Message": dropped, receive, waiting
+-- * "Behavior.Message": dropped, receive, unhandled
 -- * "Behavior.Parallel": await, decide, fork, pinned, scoped
 -- * "Behavior.STM": check, retry, and what else stm exports
 -- * "Behavior.Time": checkpoint, every, now, timeout

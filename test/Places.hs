@@ -18,7 +18,7 @@ import Data.Maybe (listToMaybe)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
-import Behavior.Message (handleNext, onMessage, withInbox)
+import Behavior.Message (handleNext, messageRule, onMessage, withInbox)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
 import Behavior.STM (withTSem)
 import qualified Behavior.Signal as Signal
@@ -93,6 +93,9 @@ places =
   , inThread "onMessage" "task" (\act -> withMessages [] (\inbox -> onMessage inbox (\() -> hang) act))
   , inThread "onMessage" "handler" $ \act ->
       withMessages [()] (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure ()))
+  , inThread "messageRule" "handler" $ \act -> withMessages [()] $ \inbox -> do
+      rule <- messageRule inbox (\() -> pure () <$ act)
+      Signal.teleoReactive [rule, (pure True, pure ())]
   , inPlace "the handler of handleNext" $ \act ->
       withMessages [()] (\inbox -> handleNext inbox (\() -> pure () <$ act))
   , inPlace "withInbox" (withMessages [()] . const)

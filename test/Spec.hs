@@ -9,6 +9,7 @@ import qualified Behavior.BadReadingSpec
 import qualified Behavior.FailureSpec
 import qualified Behavior.FromOutsideSpec
 import qualified Behavior.InsteadWhenSpec
+import qualified Behavior.MessageRuleSpec
 import qualified Behavior.MessageSpec
 import qualified Behavior.MonitorSpec
 import qualified Behavior.CleanupSpec
@@ -106,6 +107,7 @@ main = hspec $ do
     describe "resumable" Behavior.ResumableSpec.spec
     describe "withTSem" Behavior.SemaphoreSpec.spec
   describe "Messages" Behavior.MessageSpec.spec
+  describe "Messages as a rule" Behavior.MessageRuleSpec.spec
   describe "Your own monad" Behavior.UnliftIOSpec.spec
   describe "Runtime" Behavior.RuntimeSpec.spec
   describe "Running a program" Behavior.RunBehaviorSpec.spec

@@ -13,14 +13,17 @@ module Behavior.Message
   ( -- * Receiving
     Inbox
   , withInbox
+  , namedInbox
+  , namedInboxWith
 
     -- * Handling each message
   , onMessage
+  , messageRule
   , handleNext
 
     -- * In transactions
   , receive
-  , waiting
+  , unhandled
   , dropped
   ) where
 

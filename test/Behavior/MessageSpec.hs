@@ -36,7 +36,7 @@ spec = guarded $ do
 inbox :: Spec
 inbox = do
   prop "keeps the newest messages, in order, and counts those that it drops" $ \(Positive size) messages ->
-    withInbox size (delivering messages) (\box -> atomically ((,,) <$> waiting box <*> allOf box <*> dropped box))
+    withInbox size (delivering messages) (\box -> atomically ((,,) <$> unhandled box <*> allOf box <*> dropped box))
       `shouldReturn` let kept = reverse (take size (reverse (messages :: [Int]))) in (length kept, kept, length messages - length kept)
 
   it "refuses a capacity of less than one, and does not subscribe" $ do
@@ -65,7 +65,7 @@ inbox = do
     ending (withInbox 9 (\deliver -> throwIO (Fault "unsubscribing") <$ writeIORef callback deliver) (\box -> writeIORef boxes [box]))
       `shouldReturn` FaultedWith (show (Fault "unsubscribing"))
     readIORef callback >>= ($ 'c')
-    readIORef boxes >>= traverse (atomically . waiting) >>= (`shouldBe` [0])
+    readIORef boxes >>= traverse (atomically . unhandled) >>= (`shouldBe` [0])
 
   it "takes a hundred thousand messages that nothing receives in constant memory" $
     inConstantMemory 100000 $ \step ->
@@ -80,7 +80,7 @@ handlingEach = do
     sameAs
       (\entries -> withInbox 9 (delivering messages) $ \box -> onMessage box (handler entries b) (play entries a))
       ( \entries -> withInbox 9 (delivering messages) $ \box ->
-          Signal.monitor ((> 0) <$> Signal.watching (waiting box)) (handleNext box (handler entries b)) (play entries a)
+          Signal.monitor ((> 0) <$> Signal.watching (unhandled box)) (handleNext box (handler entries b)) (play entries a)
       )
 
   it "stops the task for each message, handles it, and starts the task again" $ do
@@ -99,7 +99,7 @@ handlingEach = do
       done <- newTVarIO ""
       withInbox 9 (delivering "ab") $ \box -> do
         _ <- ending (onMessage box (const how) (pure ()))
-        atomically (waiting box) `shouldReturn` 2
+        atomically (unhandled box) `shouldReturn` 2
         onMessage box (\m -> pure (modifyTVar' done (m :))) (pure ())
       readTVarIO done `shouldReturn` "ba"
 
@@ -281,4 +281,4 @@ delivering messages deliver = pure () <$ traverse_ deliver messages
 
 -- | Receives all that is waiting.
 allOf :: Inbox e -> STM [e]
-allOf box = waiting box >>= \n -> traverse (const (receive box)) [1 .. n]
+allOf box = unhandled box >>= \n -> traverse (const (receive box)) [1 .. n]

@@ -15,7 +15,7 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 
 import Behavior
-import Behavior.Message (handleNext, waiting, withInbox)
+import Behavior.Message (handleNext, unhandled, withInbox)
 import qualified Behavior.Signal as Signal
 import Behavior.STM
 import Behavior.Sim (Plan, exhaustively, explore, randomly)
@@ -164,7 +164,7 @@ repeatedStep plan carryingOut = do
         drains = for_ [2, 4 :: Seconds] $ \_ -> sleep 2 >> atomically (writeTVar low True)
         orders deliver = pure () <$ for_ [1, 2] deliver
         order inbox = attempt 2 (handleNext inbox (\n -> carryingOut progress n (step n)))
-        allOrders inbox = atomically (waiting inbox) >>= \n -> if n == 0 then pure () else order inbox >> allOrders inbox
+        allOrders inbox = atomically (unhandled inbox) >>= \n -> if n == 0 then pure () else order inbox >> allOrders inbox
     _ <- simulate' (withInbox 5 orders (Signal.monitor (Signal.watching (readTVar low)) recharge . allOrders) ||| (drains >> hang))
     steps <- readIORef done
     when (length steps > length (nub steps)) $ writeIORef found True

@@ -97,6 +97,7 @@ places =
   , ("withTSem", [\act -> atomically (newTSem 1) >>= (`withTSem` act)])
   , ("withInbox", [\act -> withInbox 1 (const (pure () <$ act)) (const (pure ())), \act -> withInbox 1 (const (pure act)) (const (pure ())), withMessage . const])
   , ("onMessage", [\act -> withMessage (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure ())), \act -> withMessage (\inbox -> atomically (receive inbox) >> onMessage inbox (const failed) act)])
+  , ("messageRule", [\act -> withMessage (\inbox -> messageRule inbox (\() -> pure () <$ act) >>= \rule -> Signal.teleoReactive [rule, (pure True, pure ())])])
   , ("handleNext", [\act -> withMessage (`handleNext` (\() -> pure () <$ act))])
   , ("Trace.named", [Trace.named "name"])
   , ("Trace.withTrace", [Trace.withTrace []])

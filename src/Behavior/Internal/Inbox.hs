@@ -8,42 +8,55 @@
 module Behavior.Internal.Inbox
   ( Inbox
   , withInbox
+  , namedInbox
+  , namedInboxWith
   , onMessage
+  , messageRule
   , handleNext
   , receive
-  , waiting
+  , unhandled
   , dropped
   ) where
 
 import Control.Concurrent.STM (STM, TVar, modifyTVar', newTVarIO, readTVar, retry, writeTVar)
 import Control.Exception (ErrorCall (..), bracket, finally, mask, onException, throwIO)
-import Control.Monad (when)
-import Data.Foldable (traverse_)
+import Control.Monad (forever, when)
+import Data.Foldable (for_, traverse_)
+import Data.List.NonEmpty (NonEmpty (..))
+import qualified Data.List.NonEmpty as NonEmpty
 import Data.Sequence (Seq, ViewL (..), viewl, (<|), (|>))
 import qualified Data.Sequence as Seq
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine (Next (..), Reaction (..), react)
-import Behavior.Internal.Runtime (atomically)
-import Behavior.Internal.Signal.Source (named, watching)
+import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Scope (branch, endedBy, outcome, structured)
+import Behavior.Internal.Signal.Source (Signal, named, watching)
+import qualified Behavior.Internal.Trace.Span as Span
 
 -- $setup
 -- >>> import Behavior
+-- >>> import qualified Behavior.Signal as Signal
 -- >>> import Behavior.STM (STM, newTVarIO, modifyTVar', readTVarIO)
 -- >>> import Control.Concurrent (forkIO)
 -- >>> import Data.Foldable (for_)
 
--- | The messages that a driver has delivered and that nothing has taken yet, oldest first. When
--- there are more than its capacity, the oldest is dropped, and counted.
+-- | The messages that a driver has delivered and that nothing has taken yet, oldest first. When more
+-- wait than its capacity, the oldest is dropped, and counted.
 --
 -- @since 0.1.0.0
 data Inbox e = Inbox
   { capacity :: !Int
   , queue :: !(TVar (Seq (Message e)))
   -- ^ At most 'capacity' messages; their numbers increase.
+  , handling :: !(NonEmpty (TVar Int))
+  -- ^ How many messages are being handled that were taken through this handle of the inbox; and
+  -- through those that it was made from.
   , nextNumber :: !(TVar Int)
   , droppedCount :: !(TVar Int)
   , isOpen :: !(TVar Bool)
+  , called :: !(Maybe (String, e -> String))
+  -- ^ For traces: its name, and the text of a message.
   }
 
 -- | A message, and its number in the order of delivery.
@@ -75,14 +88,40 @@ withInbox :: Int -> ((e -> IO ()) -> IO (IO ())) -> (Inbox e -> Behavior a) -> B
 withInbox size subscribe behavior = do
   when (size < 1) . throwIO . ErrorCall $
     "withInbox: an inbox has room for at least 1 message, not " ++ show size
-  inbox <- Inbox size <$> newTVarIO Seq.empty <*> newTVarIO 0 <*> newTVarIO 0 <*> newTVarIO True
+  messages <- newTVarIO Seq.empty
+  inbox <- Inbox size messages <$> (pure <$> newTVarIO 0) <*> newTVarIO 0 <*> newTVarIO 0 <*> newTVarIO True <*> pure Nothing
   let close = atomically (writeTVar (isOpen inbox) False)
   bracket (subscribe (atomically . deliver inbox)) (close `finally`) (\_ -> behavior inbox)
 
--- | Runs the task; whenever there is a message, stops the task, has the message handled, and begins
+-- | Gives the inbox a name. In a trace ("Behavior.Trace"), the handling of each message is a span: from when the
+-- message is taken to its commit, with the name of the inbox and the text of the message.
+--
+-- > namedInbox name  =  namedInboxWith name show
+--
+-- >>> import Behavior.Trace (withTrace)
+-- >>> let orders deliver = pure () <$ deliver "tea"
+-- >>> withTrace [] . withInbox 10 orders $ \inbox -> handleNext (namedInbox "order" inbox) (\_ -> failWith "spilt")
+-- *** Exception: order: "tea": FailedBecause "spilt"
+--
+-- @since 0.1.0.0
+namedInbox :: Show e => String -> Inbox e -> Inbox e
+namedInbox name = namedInboxWith name show
+
+-- | 'namedInbox', with a function for the text of a message. What is said of texts at
+-- 'Behavior.Signal.namedWith' holds here too.
+--
+-- >>> let camera deliver = pure () <$ deliver ("cat", [0x89, 0x50 :: Int])
+-- >>> withInbox 10 camera $ \inbox -> handleNext (namedInboxWith "seen" fst inbox) (pure . pure . fst)
+-- "cat"
+--
+-- @since 0.1.0.0
+namedInboxWith :: String -> (e -> String) -> Inbox e -> Inbox e
+namedInboxWith name render inbox = inbox {called = Just (name, render)}
+
+-- | Runs the task; whenever a message waits, stops the task, has the message handled, and begins
 -- again.
 --
--- > onMessage inbox handle task  =  monitor ((> 0) <$> watching (waiting inbox)) (handleNext inbox handle) task
+-- > onMessage inbox handle task  =  monitor ((> 0) <$> watching (unhandled inbox)) (handleNext inbox handle) task
 -- >   -- if nothing else takes messages from the inbox
 --
 -- The handler does what takes time, and returns a transaction. That transaction and the removal of
@@ -110,12 +149,50 @@ withInbox size subscribe behavior = do
 --
 -- @since 0.1.0.0
 onMessage :: Inbox e -> (e -> Behavior (STM ())) -> Behavior a -> Behavior a
-onMessage inbox handle task = react "onMessage" ((> 0) <$> named "messages waiting" (watching (waiting inbox))) $ \case
+onMessage inbox handle task = react "onMessage" ((> 0) <$> counting "waiting" inbox (queued inbox)) $ \case
   True -> RunToEnd "handler" (BeginAgain <$ handleIfAny)
   False -> Run "task" task
  where
   -- (Something else may have taken it meanwhile.)
-  handleIfAny = mask $ \restore -> atomically (tryTake inbox) >>= traverse_ (handling inbox (restore . handle))
+  handleIfAny = mask $ \restore -> atomically (tryTake inbox) >>= traverse_ (handleTaken inbox (restore . handle))
+
+-- | The handling of messages as one of the ordered rules of 'Behavior.Signal.teleoReactive':
+--
+-- > rule <- messageRule inbox handle
+-- > teleoReactive [(danger, flee), rule, (pure True, patrol)]
+--
+-- Its condition holds while a message waits or is being handled by this rule. Its behaviour has each
+-- message handled, and does not return. What is said of the handler at 'onMessage' holds here too: whatever
+-- rule comes before it and interrupts it, each message's transaction is committed exactly once. A rule after
+-- it runs when all messages have been handled, or are being handled elsewhere.
+--
+-- >>> danger <- newTVarIO True
+-- >>> let orders deliver = pure () <$ for_ ["tea", "milk"] deliver
+-- >>> let flee = putStrLn "flee" >> atomically (writeTVar danger False) >> forever (sleep 1)
+-- >>> let serve order = putStrLn ("serve " ++ order) >> pure (pure ())
+-- >>> :{
+-- withInbox 10 orders $ \inbox -> do
+--   rule <- messageRule inbox serve
+--   Signal.teleoReactive [(Signal.watching (readTVar danger), flee), rule, (pure True, putStrLn "patrol")]
+-- :}
+-- flee
+-- serve tea
+-- serve milk
+-- patrol
+--
+-- (A rule of your own, from 'unhandled' and 'handleNext', ends 'Behavior.Signal.teleoReactive' when a message has
+-- been handled, as any rule does that returns.)
+--
+-- @since 0.1.0.0
+messageRule :: Inbox e -> (e -> Behavior (STM ())) -> Behavior (Signal Bool, Behavior a)
+messageRule inbox handle = do
+  here <- newTVarIO 0
+  let ours = inbox {handling = here :| NonEmpty.toList (handling inbox)}
+  pure ((> 0) <$> counting "unhandled" inbox (unhandled ours), forever (inBranch (handleNext ours handle)))
+ where
+  -- A handler that completes although its stop was requested does not keep the rule from being stopped.
+  inBranch act = structured "messageRule" $ \scope ->
+    branch scope (Label "messageRule" "handler") act >>= fmap (endedBy "handler") . atomically . outcome
 
 -- | Waits for a message, and has it handled: once.
 --
@@ -140,28 +217,47 @@ onMessage inbox handle task = react "onMessage" ((> 0) <$> named "messages waiti
 -- @since 0.1.0.0
 handleNext :: Inbox e -> (e -> Behavior (STM a)) -> Behavior a
 handleNext inbox handle = mask $ \restore ->
-  atomically (takeOldest inbox) >>= handling inbox (restore . handle)
+  atomically (tryTake inbox >>= maybe retry pure) >>= handleTaken inbox (restore . handle)
 
 -- | Has a message handled that was taken. Call it masked: nothing may come between the taking and
 -- this, or between the handler's end and the commit.
-handling :: Inbox e -> (e -> Behavior (STM a)) -> Message e -> Behavior a
-handling inbox handle message@(Message _ e) =
-  (handle e >>= atomically) `onException` atomically (putBack inbox message)
+handleTaken :: Inbox e -> (e -> Behavior (STM a)) -> Message e -> Behavior a
+handleTaken inbox handle message@(Message _ e) =
+  maybe id (\(name, render) -> Span.named (name ++ ": " ++ render e)) (called inbox) $
+    (handle e >>= \commit -> atomically (commit <* isHandled)) `onException` atomically (isHandled >> putBack inbox message)
+ where
+  isHandled = for_ (handling inbox) (`modifyTVar'` subtract 1)
 
 -- | Takes the oldest message; retries while there is none.
 --
--- A behaviour that is interrupted after this has lost the message: 'handleNext' and 'onMessage' do not.
+-- A behaviour that is interrupted after this has lost the message: 'handleNext' and 'onMessage' do not. So it
+-- does not belong into one of ordered rules: when the last message has been taken, the rule's condition no
+-- longer holds.
 --
 -- @since 0.1.0.0
 receive :: Inbox e -> STM e
-receive inbox = (\(Message _ e) -> e) <$> takeOldest inbox
+receive inbox = takeOldest inbox >>= maybe retry (\(Message _ e) -> pure e)
 
--- | How many messages wait: those that are neither taken, nor dropped, nor being handled.
--- @'Behavior.Signal.watching' (waiting inbox)@ is a signal.
+-- | How many messages are not handled yet: those that wait, and those that are being handled until their
+-- transaction is committed. (What was taken by 'receive', or dropped, does not count.)
+--
+-- > waitUntil ((== 0) <$> watching (unhandled inbox))     -- all has been handled
+--
+-- >>> let orders deliver = pure () <$ for_ ["tea", "milk"] deliver
+-- >>> withInbox 10 orders $ \inbox -> handleNext inbox (\_ -> pure <$> atomically (unhandled inbox))
+-- 2
 --
 -- @since 0.1.0.0
-waiting :: Inbox e -> STM Int
-waiting inbox = Seq.length <$> readTVar (queue inbox)
+unhandled :: Inbox e -> STM Int
+unhandled inbox = (+) <$> queued inbox <*> readTVar (NonEmpty.head (handling inbox))
+
+-- | How many messages wait.
+queued :: Inbox e -> STM Int
+queued inbox = Seq.length <$> readTVar (queue inbox)
+
+-- | The number of messages as a signal, whose name says which: of this inbox, those that are so.
+counting :: String -> Inbox e -> STM Int -> Signal Int
+counting which inbox = named (maybe "messages" fst (called inbox) ++ " " ++ which) . watching
 
 -- | How many messages were dropped because the inbox was full.
 --
@@ -188,17 +284,18 @@ putBack inbox message@(Message number _) = do
 -- | Drops the oldest message if there are more than the inbox has room for.
 dropOldest :: Inbox e -> STM ()
 dropOldest inbox = do
-  n <- waiting inbox
+  n <- queued inbox
   when (n > capacity inbox) $ do
     modifyTVar' (queue inbox) (Seq.drop 1)
     modifyTVar' (droppedCount inbox) (+ 1)
 
-takeOldest :: Inbox e -> STM (Message e)
-takeOldest inbox = tryTake inbox >>= maybe retry pure
+-- | Takes the oldest message, if there is one, to have it handled.
+tryTake :: Inbox e -> STM (Maybe (Message e))
+tryTake inbox = takeOldest inbox >>= traverse (\message -> message <$ for_ (handling inbox) (`modifyTVar'` (+ 1)))
 
 -- | Takes the oldest message, if there is one.
-tryTake :: Inbox e -> STM (Maybe (Message e))
-tryTake inbox =
+takeOldest :: Inbox e -> STM (Maybe (Message e))
+takeOldest inbox =
   readTVar (queue inbox) >>= \messages -> case viewl messages of
     EmptyL -> pure Nothing
     message :< newer -> Just message <$ writeTVar (queue inbox) newer

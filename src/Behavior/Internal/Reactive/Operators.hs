@@ -152,6 +152,10 @@ switch signal behavior = react "switch" signal (Run "branch" . behavior)
 -- running behaviour is stopped, the conditions are read again, and the first one that
 -- then holds decides. Everything that is documented for 'rSelect' holds here too.
 --
+-- A rule that returns ends 'teleoReactive', with its result. A rule that has done its work when its condition
+-- no longer holds is therefore a loop, or waits at its end: if its last step makes the condition false, it may
+-- either return or be stopped first. Messages of a driver as one of the rules: 'Behavior.Message.messageRule'.
+--
 -- >>> Signal.teleoReactive [(pure False, pure "flee"), (pure True, pure "graze")]
 -- "graze"
 --

@@ -9,22 +9,26 @@ module Behavior.UnliftIO.Message
   ( -- * Receiving
     Inbox
   , withInbox
+  , namedInbox
+  , namedInboxWith
 
     -- * Handling each message
   , onMessage
+  , messageRule
   , handleNext
 
     -- * In transactions
   , receive
-  , waiting
+  , unhandled
   , dropped
   ) where
 
-import Control.Monad.IO.Unlift (MonadUnliftIO, withRunInIO)
+import Control.Monad.IO.Unlift (MonadIO (..), MonadUnliftIO, withRunInIO)
 
-import Behavior.Message (Inbox, dropped, receive, waiting)
+import Behavior.Message (Inbox, dropped, namedInbox, namedInboxWith, receive, unhandled)
 import qualified Behavior.Message as IO
 import Behavior.STM (STM)
+import Behavior.Signal (Signal)
 
 -- | 'Behavior.Message.withInbox'. The driver's callback is in 'IO'.
 --
@@ -41,6 +45,14 @@ withInbox size subscribe act = withRunInIO $ \run -> IO.withInbox size (fmap run
 -- @since 0.1.0.0
 onMessage :: MonadUnliftIO m => Inbox e -> (e -> m (STM ())) -> m a -> m a
 onMessage inbox handle task = withRunInIO $ \run -> IO.onMessage inbox (run . handle) (run task)
+
+-- | 'Behavior.Message.messageRule'.
+--
+-- > run (messageRule i f)  =  fmap liftIO <$> Behavior.Message.messageRule i (run . f)
+--
+-- @since 0.1.0.0
+messageRule :: MonadUnliftIO m => Inbox e -> (e -> m (STM ())) -> m (Signal Bool, m a)
+messageRule inbox handle = withRunInIO $ \run -> fmap liftIO <$> IO.messageRule inbox (run . handle)
 
 -- | 'Behavior.Message.handleNext'.
 --
