@@ -219,18 +219,17 @@ launch (Scope branches) startThread = mask_ $ do
   pure new
 
 -- | Removes from the scope a branch that has ended and did not fault. Otherwise the scope
--- would grow with every branch that an operator ever started.
+-- would grow with every branch that an operator ever started. (It is mostly the newest one.)
 forget :: Scope -> Branch a -> IO ()
 forget (Scope branches) old = modifyIORef' branches without
  where
-  -- Strict: an unevaluated list would keep a reference to the removed branch.
   without [] = []
   without (SomeBranch b : others)
     | branchId b == branchId old = others
-    | otherwise = let rest = without others in rest `seq` (SomeBranch b : rest)
+    | otherwise = SomeBranch b : without others
 
 -- | Removes from the scope all branches that have ended and did not fault, in one walk over it, and
--- gives how many are left. (To 'forget' one of them is a walk over all that are newer.)
+-- gives how many are left. (To 'forget' one is a walk over all that are newer.)
 forgetEnded :: Scope -> IO Int
 forgetEnded (Scope branches) = do
   (left, oldestFirst) <- readIORef branches >>= foldM without (0, [])
