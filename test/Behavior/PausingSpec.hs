@@ -12,9 +12,9 @@ import Data.IORef
 import Test.Hspec
 
 import Behavior
-import Behavior.Sim (exhaustively, explain, explore, outcome, randomly, simulate)
+import Behavior.Sim (Plan, exhaustively, explain, explore, outcome, randomly, simulate)
 import Behavior.Signal (Signal, pausedWhile, stoppedWhile, teleoReactive)
-import Behavior.Time (atomically, now, sleepUntil, timeout)
+import Behavior.Time (atomically, checkpoint, now, sleepUntil, timeout)
 import Support
 import Watched
 
@@ -71,9 +71,15 @@ pauses = do
       explain (outcome run) `shouldNotContain` "returned"
       readTVarIO stopped `shouldReturn` True
 
-  it "pauses and resumes in turn, and leaves nothing paused, under random schedules" $ do
-    inTurn 500 4 [True, False, True, False, True]
-    inTurn 500 2 [True, False]
+  describe "pauses and resumes in turn, and leaves nothing paused," $ do
+    it "under random schedules" $ inTurn (randomly 1000) 4 [True, False, True, False, True]
+    it "under random schedules in which it is cancelled as the condition changes" $ inTurn (randomly 1000) 2 [True, False]
+    it "under all schedules of a behaviour that makes the condition true, and ends" . void . explore (exhaustively 1) $ \simulate' -> do
+      near <- newTVarIO False
+      paused <- newTVarIO False
+      let become = atomically . writeTVar paused
+      _ <- simulate' (pausedWhile (watchedVar near) (become True >> checkpoint) (become False) (atomically (writeTVar near True)))
+      readTVarIO paused `shouldReturn` False
 
 stops :: Spec
 stops = do
@@ -115,8 +121,8 @@ story changes act = do
 
 -- | A driver that is paused and resumed, each in two steps, and a behaviour that ends, or is stopped
 -- after the given time: pausing and resuming never overlap, and at the end the driver is not paused.
-inTurn :: Int -> Seconds -> [Bool] -> IO ()
-inTurn count limit changes = void . explore (randomly count) $ \simulate' -> do
+inTurn :: Plan -> Seconds -> [Bool] -> IO ()
+inTurn plan limit changes = void . explore plan $ \simulate' -> do
   near <- newTVarIO False
   paused <- newTVarIO False
   counter <- newOccupancyCounter

@@ -12,6 +12,7 @@ module Behavior.Internal.Reactive.Pausing
 
 import Control.Concurrent.STM (check, newTVarIO, orElse, readTVar, writeTVar)
 import Control.Exception (finally)
+import Control.Monad (unless)
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine
@@ -38,8 +39,9 @@ import Behavior.Internal.Signal.Source
 --
 -- That @resume@ runs is certain once @pause@ has begun, whatever happens: if @act@ ends meanwhile, if
 -- the caller is cancelled, if @pause@ itself fails, or is no longer needed before it has ended (it is then
--- stopped). It runs as a cleanup does, with 'finally': if it takes time, limit it
--- (@'Behavior.Time.cleanupWithin' 1 resume@). Of @pause@ and @resume@ never two run at once.
+-- stopped, perhaps before it had an effect: to resume what is not paused must do no harm). It runs as a
+-- cleanup does, with 'finally': if it takes time, limit it (@'Behavior.Time.cleanupWithin' 1 resume@). Of
+-- @pause@ and @resume@ never two run at once.
 --
 -- [Result] That of @act@.
 -- [Failure] Of @act@, @pause@ or @resume@, or of the condition: @act@ is stopped, and it is thrown. A
@@ -65,9 +67,17 @@ import Behavior.Internal.Signal.Source
 pausedWhile :: Signal Bool -> Behavior () -> Behavior () -> Behavior a -> Behavior a
 pausedWhile condition pause resume act = structured "pausedWhile" $ \scope -> do
   begun <- newTVarIO False
-  let pausing = react "pausedWhile" (unlessNamed "condition" condition) $ \case
-        False -> Run "going on" (atomically (writeTVar begun True) >> sleepForever)
-        True -> Run "pause" (atomically (readTVar begun >>= check) >> (pause >> sleepForever) `finally` resume)
+  let -- Nothing before the condition was false for the first time.
+      phase holds = do
+        is <- readTVar begun
+        unless (is || holds) (writeTVar begun True)
+        pure (if is || not holds then Just holds else Nothing)
+      phases = Signal $ \_ -> do
+        source <- open (suppressEqual (unlessNamed "condition" condition)) everyValue
+        pure source {view = mapView (>>= phase) <$> view source}
+      pausing = react "pausedWhile" phases $ \case
+        Just True -> Run "pause" ((pause >> sleepForever) `finally` resume)
+        _ -> Idle
   step <- branch scope (Label "pausedWhile" "branch") (atomically (readTVar begun >>= check) >> act)
   pauses <- branch scope (Label "pausedWhile" "pauses") pausing
   atomically ((endedBy "branch" <$> outcome step) `orElse` (endedBy "pauses" <$> outcome pauses))
