@@ -14,7 +14,7 @@
 -- * "Behavior.STM": check, retry, and what else stm exports
 -- * "Behavior.Time": checkpoint, every, now, timeout
 -- * "Behavior.Trace": adopt, named
--- * "Behavior.Sim": events, explain, explore, finished, outcome, randomly, scheduled, simulate, steps
+-- * "Behavior.Sim": events, explain, explore, finished, outcome, randomly, scheduled, simulate, steps, well
 -- * "Behavior.Sim.Mock": action, always, begin, being, clear, condition, driver, during, eventually, exactly, fails,
 --   faults, hangs, happened, holds, never, note, noted, outside, reading, returning, running, sensor, set, signal,
 --   succeeds, taking, throws, verdict, whenever

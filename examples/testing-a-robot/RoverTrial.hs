@@ -2,7 +2,6 @@
 -- The tests of the rover in the tutorial "Testing a robot".
 module RoverTrial
   ( trial
-  , well
   , wholeMission
   , wayHome
   , asHspec
@@ -47,12 +46,6 @@ trial task pressed run = do
       , redButton = signal button
       }
   field `shouldRecord` whenever (becoming "motor runs" True) (eventually (becoming "motor runs" False))
-
--- | Expects that the behaviour returned.
-well :: Run () -> IO ()
-well run = case outcome run of
-  Returned () -> pure ()
-  other -> fail (explain other)
 
 -- | The button is pressed at the moment when the battery becomes low.
 wholeMission :: (Rover -> Behavior ()) -> Plan -> IO Report

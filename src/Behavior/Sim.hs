@@ -85,6 +85,7 @@ module Behavior.Sim
   , Run (..)
   , Outcome (..)
   , explain
+  , well
   , Waiting (..)
   , Blocked (..)
   , Step (..)

@@ -28,7 +28,6 @@ spec = guarded $ do
   describe "Under many schedules" manySchedules
   it "keeps its rules on real threads, too" $ do
     (world, hardware) <- greenhouses calm {emergency = pressedAt 1}
-    _ <- condition world later (pressedAt 1.1)
     beds <- newBeds [Bed North 1]
     try (rover hardware beds) `shouldReturn` Left EmergencyStopped
     world `shouldRecord` safely <> stopped
@@ -45,7 +44,7 @@ missions = do
     run <- simulate . scoped $ \nursery -> do
       _ <- fork nursery (sleep 2 >> mapM_ (atomically . addBed beds) [Bed South 1, Bed North 1])
       rover hardware beds
-    found <- returned run
+    found <- well run
     found `shouldBe` Map.fromList (seen <$> [Bed North 1, Bed South 1])
     world `shouldRecord` exactly 1 (startOf "camera Bed North 1")
   it "continues its list after charging" $ do
@@ -106,7 +105,7 @@ manySchedules = do
   it "inspects each bed once, with interruptions at any time" $
     for_ (quarters 16) $ \moment ->
       explored 4 (interruptedAt moment) $ \world run -> do
-        found <- returned run
+        found <- well run
         found `shouldBe` Map.fromList (seen <$> [Bed North 1, Bed South 1])
         world `shouldRecord` safely
  where
@@ -118,7 +117,6 @@ manySchedules = do
       }
   explored n setting property = explore (randomly n) {planShowException = asHspec} $ \simulated -> do
     (world, hardware) <- greenhouses setting
-    _ <- condition world later [(t + 0.1, on) | (t, on) <- emergency setting]
     beds <- newBeds [Bed North 1, Bed South 1]
     simulated (rover hardware beds) >>= property world
 
@@ -130,7 +128,7 @@ safely = never (being "motors" True `overlapping` being "arm out" True) <> once 
 -- are off and stay off, and the arm is parked at the end.
 stopped :: Claim
 stopped =
-  whenever (becoming later True) (always (being "motors" False))
+  never (being "motors" True `overlapping` (being "emergency stop" True `heldFor` 0.1))
     <> whenever (becoming "emergency stop" True) (eventually (successOf "park arm"))
 
 -- | No bed is inspected again after a success.
@@ -138,10 +136,6 @@ once :: [Bed] -> Claim
 once = foldMap $ \bed ->
   let name = "camera " ++ show bed
    in whenever (successOf name) (never (startOf name))
-
--- | A condition that is true from a tenth of a second after the emergency stop.
-later :: String
-later = "a moment after the emergency stop"
 
 pressedAt :: Seconds -> [(Seconds, Bool)]
 pressedAt moment = [(0, False), (moment, True)]
@@ -153,10 +147,5 @@ inspecting :: [Bed] -> Setting -> IO (Found, Mock)
 inspecting todo setting = do
   (world, hardware) <- greenhouses setting
   beds <- newBeds todo
-  found <- simulate (rover hardware beds) >>= returned
+  found <- simulate (rover hardware beds) >>= well
   pure (found, world)
-
-returned :: Run a -> IO a
-returned run = case outcome run of
-  Returned a -> pure a
-  other -> fail (explain other)

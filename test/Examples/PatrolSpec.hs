@@ -9,6 +9,7 @@ import Test.Hspec
 
 import Behavior
 import Behavior.STM
+import Behavior.Sim (well)
 import Behavior.Sim.Mock
 import qualified Behavior.Signal as Signal
 import Behavior.Time (checkpoint, timeout)
@@ -61,7 +62,7 @@ worstDay pressedAt robot simulated = do
         , personSeen = signal seen
         , redButton = signal button
         }
-  ended run `shouldBe` "returned"
+  well run
   world `shouldRecord` inOrder <> eventually (successOf (reportOf (if pressedAt > 10 then "C" else "A")))
   world `shouldRecord` whenever (becoming "battery low" True) (withinSeconds 0 (startOf "recharge"))
   world `shouldRecord` never (running "drive to" `overlapping` running "recharge")

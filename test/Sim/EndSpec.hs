@@ -32,6 +32,7 @@ spec = guarded $ do
   describe "The record of a mock world ends when the run does" records
   describe "With a finite endAt" ends
   describe "The cause is reported" faults'
+  describe "A run that is well" wells
   describe "A run with many threads" wide
 
 -- | Runs an action while a motor is switched on; the cleanup switches it off.
@@ -121,6 +122,23 @@ ends = do
       _ -> expectationFailure (explain (outcome run))
     explain (outcome run) `shouldSatisfy` \said -> all (`isInfixOf` said) ["s of virtual time", "see endAt", "see realTimeLimit"]
     over - begun `shouldSatisfy` (< 8)
+
+wells :: Spec
+wells = do
+  it "has returned, and its result is given" $
+    (simulate (sleep 1 >> pure 'a') >>= well) `shouldReturn` 'a'
+  it "has not failed, faulted, or been ended" $ do
+    for_
+      [ (simulate (failWith "locked"), "it failed: the behaviour failed: locked")
+      , (simulate (throwIO (userError "no radio")), "it faulted: user error (no radio)")
+      , (simulate (atomically retry), "deadlock")
+      , (simulateWith defaultSimOptions {endAt = 1} (sleep 2), "the virtual time has come to the end")
+      ]
+      $ \(simulated, why) -> (simulated >>= well) `shouldThrow` \(ErrorCall said) -> why `isPrefixOf` said
+  it "has left no thread running" $ do
+    world <- newMock
+    messages <- driver world "messages" [(100, 'x')]
+    (simulate (void (messages (const (pure ())))) >>= well) `shouldThrow` (== ErrorCall "it returned, but these threads were left running: driver: messages")
 
 faults' :: Spec
 faults' = do

@@ -233,6 +233,43 @@ whiles = do
   it "include the cleanup" $
     countOf (interruptionOf "drive" `during` running "drive") day `shouldBe` 1
 
+  describe "that have been going on for some time" $ do
+    let held = never . (running "drive" `overlapping`) . (being "low" True `heldFor`)
+    it "do not hold a tie against an action, nor what has ended in time" $ do
+      let ends t = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line t "drive" Stops, line 9 "low" (Becomes "False")]
+          starts t = [line 4 "low" (Becomes "True"), line t "drive" Begins, line 9 "low" (Becomes "False")]
+          holding claim rows = holds claim (Record ["low", "drive"] rows)
+      [holding (held s) (ends t) | (s, t) <- [(0, 4), (0, 4.05), (0.1, 4.05), (0.1, 4.1), (0.1, 4.2)]] `shouldBe` [True, False, True, True, False]
+      -- An action that is not stopped at all overlaps, even if it begins within the grace.
+      [holding (held s) (starts t) | (s, t) <- [(0, 4), (0.1, 4), (0.1, 4.05), (0.1, 5), (6, 5)]] `shouldBe` [False, False, False, False, True]
+    it "restrict moments, and hold always, only then" $ do
+      countOf (interruptionOf "drive" `during` being "low" True) day `shouldBe` 1
+      countOf (interruptionOf "drive" `during` (being "low" True `heldFor` 0)) day `shouldBe` 0
+      map (\s -> countOf (startOf "charge" `during` (being "low" True `heldFor` s)) day) [0.9, 1, 5, 6] `shouldBe` [1, 0, 0, 0]
+      map (\s -> holds (whenever (startOf "charge") (always (running "charge" `heldFor` s))) day) [0, 1] `shouldBe` [False, False]
+      holds (whenever (endOf "drive" `during` (being "low" True `heldFor` 0.5)) (withinSeconds 0 (startOf "charge"))) day `shouldBe` True
+    it "are those of the interval, if that is one of these" $
+      map (\s -> countOf (startOf "charge" `during` (being "low" True `heldFor` 0.5 `heldFor` s)) day) [0.4, 0.5] `shouldBe` [1, 0]
+    it "are told with the time at which they begin" $
+      (Record ["low", "drive"] [line 0 "drive" Begins, line 4 "low" (Becomes "True")], held 0.1)
+        `refutedBy` ["This does not hold: never \"drive\" is running while \"low\" is True for over 0.1 s.", "It was so at 4.1 s:"]
+  describe "shortly after a moment" $ do
+    it "include what is recorded at the same time before it, and what comes in time after it" $ do
+      let found rows = countOf (noted "x" `during` shortlyAfter 0.1 (startOf "a")) (Record ["a"] rows)
+      [found [line t "x" Noted, line 5 "a" Begins] | t <- [4.9, 5]] `shouldBe` [0, 1]
+      [found [line 5 "a" Begins, line t "x" Noted] | t <- [5, 5.1, 5.2]] `shouldBe` [1, 1, 0]
+    it "say why something may happen" $ do
+      hold [never (interruptionOf "drive" `outside` shortlyAfter 0 (becoming "low" True)), never (startOf "charge" `outside` shortlyAfter 1 (becoming "low" True))]
+      doNotHold [never (startOf "charge" `outside` shortlyAfter 0.9 (becoming "low" True))]
+    it "can overlap with others" $
+      map (\s -> countOf (running "charge" `overlapping` shortlyAfter s (becoming "low" True)) day) [0.9, 1] `shouldBe` [0, 1]
+  it "need a number of seconds that is zero or more" $
+    for_ [-1, 0 / 0] $ \s -> do
+      evaluate (holds (always (being "low" True `heldFor` s)) day) `shouldThrow` (== ErrorCall ("heldFor: zero or more seconds, not " ++ show s))
+      evaluate (holds (always (shortlyAfter s (startOf "drive"))) day) `shouldThrow` (== ErrorCall ("shortlyAfter: zero or more seconds, not " ++ show s))
+
   it "end when the condition loses its value" $ do
     let rows = [line 0 "x" (Becomes "1"), line 1 "x" LosesValue, line 2 "a" Begins]
     countOf (startOf "a" `during` being "x" (1 :: Int)) (Record ["x", "a"] rows) `shouldBe` 0
+ where
+  (record, claim) `refutedBy` text = either (take (length text) . lines) (const []) (verdict claim record) `shouldBe` text

@@ -97,6 +97,8 @@ module Behavior.Sim.Mock
   , Interval
   , running
   , being
+  , heldFor
+  , shortlyAfter
   ) where
 
 import Behavior.Internal.Mock.Action

@@ -132,7 +132,7 @@ exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords 
 -- @since 0.1.0.0
 always :: Interval -> Claim
 always s = simple ("always " ++ intervalWords s) (intervalNames s) $ \rows (Origin origin _) ->
-  let isInside n = any (\(from, to) -> from <= n && n < to) (intervalRanges s rows)
+  let isInside n = any (\range -> from range <= at n && at n < to range) (intervalRanges s rows)
    in case [row | row@(n, entry) <- rows, n > origin, not (isInitial entry || isInside n)] of
         [] -> Nothing
         row : _ -> Just ("it was not so at " ++ inSeconds (time row), [row])

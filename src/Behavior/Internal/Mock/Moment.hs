@@ -28,12 +28,17 @@ module Behavior.Internal.Mock.Moment
   , Interval (..)
   , running
   , being
+  , heldFor
+  , shortlyAfter
+  , Range (..)
+  , at
   ) where
 
 import Data.List (intercalate)
 import Data.Maybe (fromMaybe, listToMaybe)
 
 import Behavior.Internal.Mock.Record
+import Behavior.Internal.Runtime (Seconds)
 
 -- $setup
 -- >>> import Behavior.Sim.Mock
@@ -187,7 +192,7 @@ restricted word wanted m s =
     { momentWords = momentWords m ++ " " ++ word ++ " " ++ intervalWords s
     , momentNames = momentNames m ++ intervalNames s
     , occurrences = \rows ->
-        let inside (n, _) = any (\(from, to) -> from < n && n < to) (intervalRanges s rows)
+        let inside (n, _) = any (isInside (at n)) (intervalRanges s rows)
          in filter (wanted . inside) (occurrences m rows)
     }
 
@@ -201,10 +206,11 @@ restricted word wanted m s =
 -- @since 0.1.0.0
 overlapping :: Interval -> Interval -> Moment
 overlapping a b =
-  (anyOf [starts a `during` b, starts b `during` a]) {momentWords = intervalWords a ++ " while " ++ intervalWords b}
- where
-  starts s = Moment (intervalWords s) (intervalNames s) $ \rows ->
-    let from = map fst (intervalRanges s rows) in filter ((`elem` from) . fst) rows
+  Moment (intervalWords a ++ " while " ++ intervalWords b) (intervalNames a ++ intervalNames b) $ \rows ->
+    let as = intervalRanges a rows
+        bs = intervalRanges b rows
+        these `startsIn` others = [start this | this <- these, any (isInside (from this)) others]
+     in merged (as `startsIn` bs) (bs `startsIn` as)
 
 infixl 8 `during`, `outside`, `overlapping`
 
@@ -228,10 +234,28 @@ numbered = zip [0 ..] . recordEntries
 data Interval = Interval
   { intervalWords :: String
   , intervalNames :: [String]
-  , intervalRanges :: Lines -> [(Int, Int)]
-  -- ^ The numbers of the entry that starts it and of the one that ends it ('maxBound' if
-  -- there is none), for each time that it is going on.
+  , intervalRanges :: Lines -> [Range]
+  -- ^ Each time that it is going on, in order.
   }
+
+-- | One time that an interval is going on.
+data Range = Range
+  { from :: Place
+  , to :: Place
+  , start :: (Int, RecordEntry)
+  -- ^ The entry that shows its start, at the time of the start.
+  }
+
+-- | A place in a record: at the entry with this number, or between it and the next one (if the second
+-- number is not 0).
+type Place = (Int, Int)
+
+at :: Int -> Place
+at n = (n, 0)
+
+-- | Whether a place is between the start and the end.
+isInside :: Place -> Range -> Bool
+isInside place range = from range < place && place < to range
 
 -- | The action runs: from its beginning to its end, cleanup included.
 --
@@ -254,9 +278,88 @@ being name value =
   changes (Becomes _) = True
   changes kind = kind == LosesValue
 
-rangesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Lines -> [(Int, Int)]
+rangesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Lines -> [Range]
 rangesFrom begins ends rows =
-  [ (from, fromMaybe maxBound (listToMaybe [to | (to, e) <- drop (from + 1) rows, ends entry e]))
-  | (from, entry) <- rows
+  [ Range (at n) (at (fromMaybe maxBound (listToMaybe [k | (k, e) <- drop (n + 1) rows, ends entry e]))) row
+  | row@(n, entry) <- rows
   , begins entry
   ]
+
+-- | Only after it has been going on for the given number of seconds: so what happens at the moment of its
+-- start, or shortly after it, does not count. A negative number or NaN is rejected with an
+-- 'Control.Exception.ErrorCall'.
+--
+-- >>> holds (never (running "drive" `overlapping` being "low" True)) record
+-- False
+-- >>> holds (never (running "drive" `overlapping` (being "low" True `heldFor` 1))) record
+-- True
+-- >>> check (never (running "drive" `overlapping` (being "low" True `heldFor` 0.1)))
+-- This does not hold: never "drive" is running while "low" is True for over 0.1 s.
+-- It was so at 4.1 s:
+--     ...
+--     0.0 s  drive: begins
+--     4.0 s  low: becomes True
+--   > 4.0 s  drive: stop requested
+--     5.0 s  drive: has stopped
+--     5.0 s  charge: begins
+--     ...
+--
+-- @since 0.1.0.0
+heldFor :: Interval -> Seconds -> Interval
+heldFor s seconds =
+  s
+    { intervalWords = intervalWords s ++ " for over " ++ inSeconds seconds
+    , intervalRanges = \rows -> [range | checked "heldFor" seconds, Just range <- map (later rows) (intervalRanges s rows)]
+    }
+ where
+  later rows range
+    | begun < to range = Just range {from = begun, start = (shown, entry {entryTime = due})}
+    | otherwise = Nothing
+   where
+    (n, entry) = start range
+    due = entryTime entry + seconds
+    shown = last (n : map fst (takeWhile (isBy due) (drop n rows)))
+    begun = (shown, 1 + n)
+
+infixl 9 `heldFor`
+
+-- | The given number of seconds after each time that it happens, and the moment itself: all that has the
+-- same time, whether it is recorded before or after it. A negative number or NaN is rejected with an
+-- 'Control.Exception.ErrorCall'.
+--
+-- >>> holds (never (interruptionOf "drive" `outside` shortlyAfter 0.1 (becoming "low" True))) record
+-- True
+-- >>> check (never (startOf "charge" `outside` shortlyAfter 0.1 (becoming "low" True)))
+-- This does not hold: never "charge" begins unless within 0.1 s after "low" becomes True.
+-- It was so at 5.0 s:
+--     ...
+--     4.0 s  drive: stop requested
+--     5.0 s  drive: has stopped
+--   > 5.0 s  charge: begins
+--     9.0 s  charge: done
+--
+-- @since 0.1.0.0
+shortlyAfter :: Seconds -> Moment -> Interval
+shortlyAfter seconds m =
+  Interval
+    { intervalWords = "within " ++ inSeconds seconds ++ " after " ++ momentWords m
+    , intervalNames = momentNames m
+    , intervalRanges = \rows -> [range rows row | checked "shortlyAfter" seconds, row <- occurrences m rows]
+    }
+ where
+  range rows row@(_, entry) =
+    let before = length (takeWhile (not . isBy' (entryTime entry)) rows)
+        through = length (takeWhile (isBy (entryTime entry + seconds)) rows)
+     in Range (before - 1, 1) (through - 1, 1) row
+  isBy' t (_, entry) = entryTime entry >= t - tolerance
+
+-- | Whether the entry is not later than this (to a microsecond).
+isBy :: Seconds -> (Int, RecordEntry) -> Bool
+isBy t (_, entry) = entryTime entry <= t + tolerance
+
+tolerance :: Seconds
+tolerance = 0.000001
+
+-- | Rejects a number that is not zero or more.
+checked :: String -> Seconds -> Bool
+checked name seconds = seconds >= 0 || errorWithoutStackTrace (name ++ ": zero or more seconds, not " ++ show seconds)

@@ -7,13 +7,14 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Report
   ( explain
+  , well
   , renderSteps
   , ofThreads
   , mentioning
   , text
   ) where
 
-import Control.Exception (SomeException (..), displayException)
+import Control.Exception (ErrorCall (..), SomeException (..), displayException, throwIO)
 import Data.List (groupBy, intercalate, isInfixOf)
 import Numeric (showFFloat)
 
@@ -57,6 +58,24 @@ explain = \case
     show name ++ " ran when the limit of real time was reached, at " ++ showFFloat (Just 3) t " s of virtual time: \
       \it computes for very long, or for ever (see realTimeLimit), or the behaviour has no end (see endAt)"
   ScheduleMismatch why -> "the schedule does not fit this behaviour: " ++ why
+
+-- | The result of a run that has ended well: the behaviour has returned, and no thread of it is left.
+-- Otherwise it throws an 'ErrorCall' with the text of 'explain', or with the threads that are left.
+--
+-- >>> simulate (sleep 1 >> pure 'a') >>= well
+-- 'a'
+-- >>> simulate (atomically retry) >>= well
+-- *** Exception: deadlock: every thread waits, and nothing in the simulation will wake one
+--   main waits for a transaction
+--
+-- In an exploration: @explore (randomly 1000) (\\simulated -> simulated mission >>= well)@.
+--
+-- @since 0.1.0.0
+well :: Run a -> IO a
+well run = case (outcome run, leakedThreads run) of
+  (Returned a, []) -> pure a
+  (Returned _, left) -> throwIO (ErrorCall ("it returned, but these threads were left running: " ++ commas left))
+  (other, _) -> throwIO (ErrorCall (explain other))
 
 listed :: String -> [Waiting] -> String
 listed title = intercalate "\n  " . (title :) . map (\(Waiting who what) -> show who ++ " waits for " ++ what)
