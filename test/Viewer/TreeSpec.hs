@@ -11,6 +11,7 @@ import Behavior.Trace.Tree
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
+import Viewer.Missions (beside)
 
 spec :: Spec
 spec = do
@@ -19,6 +20,8 @@ spec = do
   it "has a line for each span and each reaction, and one for what was lost" . property $ \(Related events) ->
     let r = recording events
     in length (lines (renderTree r)) === 1 + length (nodes r) + length (reactions r) + (if lost r == 0 then 0 else 1)
+  it "names the part that finished, so that others were stopped" $
+    renderTree (recording (beside 5)) `shouldSatisfy` ("listen: stopped: \"look\" finished" `isInfixOf`)
   it "reports lost events also when it has nothing else" $
     renderTree (recording [Lost 2]) `shouldSatisfy` ("2 events were lost" `isInfixOf`)
   it "is that of the events in any order" . property $ \(Related events) ->

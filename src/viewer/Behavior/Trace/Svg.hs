@@ -19,6 +19,7 @@ import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Describe hiding (outcome)
 import Behavior.Trace.Recording
+import Behavior.Trace.Siblings
 import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Header
 import Behavior.Trace.Svg.Interruptions
@@ -27,7 +28,6 @@ import Behavior.Trace.Svg.Layout
 import Behavior.Trace.Svg.Legend
 import Behavior.Trace.Svg.Outcome
 import Behavior.Trace.Svg.Pauses
-import Behavior.Trace.Svg.Siblings
 import Behavior.Trace.Svg.TimeSpent
 
 -- | The recording as an SVG file: the time from left to right, each span as a bar below the one

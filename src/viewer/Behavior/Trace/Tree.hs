@@ -13,6 +13,7 @@ import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Describe
 import Behavior.Trace.Recording
+import Behavior.Trace.Siblings
 
 -- $setup
 -- >>> import Behavior.Trace
@@ -31,8 +32,9 @@ import Behavior.Trace.Recording
 --
 -- @since 0.1.0.0
 renderTree :: Recording -> String
-renderTree r = unlines (heading : inOrder (map (reaction 0) loose ++ map (branch 0) (roots r)) remark)
+renderTree recorded = unlines (heading : inOrder (map (reaction 0) loose ++ map (branch 0) (roots r)) remark)
  where
+  r = withSiblings recorded
   heading = row "begin [s]" "took [s]" ""
   branch :: Int -> Node -> Part
   branch depth node =

@@ -1,7 +1,7 @@
 -- |
 -- Which part finished, so that the parts beside it were stopped. A trace of names knows only in which branch of the
 -- operator that was.
-module Behavior.Trace.Svg.Siblings
+module Behavior.Trace.Siblings
   ( withSiblings
   ) where
 
