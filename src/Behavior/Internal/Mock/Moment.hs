@@ -250,6 +250,7 @@ data Range = Range
 -- number is not 0).
 type Place = (Int, Int)
 
+-- | The place of the entry with this number.
 at :: Int -> Place
 at n = (n, 0)
 
