@@ -71,7 +71,7 @@ rule = do
     _ <- explore (randomly 100) $ \simulate' -> do
       atomically (writeTVar done "" >> writeTVar danger False)
       _ <- simulate' . withInbox 9 (delivering "ab") $ \box -> do
-        handling <- messageRule box (\m -> modifyTVar' done (m :) <$ (sleep 9 `catch` \e -> const (pure ()) (e :: SomeException)))
+        handling <- messageRule box (\m -> modifyTVar' done (m :) <$ (try (sleep 9) :: IO (Either SomeException ())))
         Signal.teleoReactive [(Signal.watching (readTVar danger), sleep 1), handling] `both` (sleep 1 >> atomically (writeTVar danger True))
       readTVarIO done `shouldReturn` "a"
     pure ()
@@ -93,7 +93,7 @@ rule = do
       writeIORef handled 0
       _ <- simulate' . withInbox 9 (delivering "a") $ \box -> do
         let robot = do
-              handling <- messageRule box (\_ -> sleep 10 >> pure (pure ()) <* modifyIORef' handled (+ 1))
+              handling <- messageRule box (\_ -> sleep 10 >> pure () <$ modifyIORef' handled (+ 1))
               Signal.teleoReactive [handling, (pure True, forever (sleep 1 >> modifyIORef' patrols (+ 1)))]
         (robot `both` robot) ||| sleep 9.5
       (,) <$> readIORef patrols <*> readIORef handled >>= (`shouldBe` (9, 0))
@@ -199,9 +199,9 @@ counting = do
     withInbox 9 (delivering "ab") $ \box -> do
       let count = atomically (unhandled box)
       count `shouldReturn` 2
-      handleNext box (\_ -> (`shouldBe` 2) <$> count >>= \checked -> pure () <$ checked) `shouldReturn` ()
+      handleNext box (\_ -> pure <$> count) `shouldReturn` 2
       count `shouldReturn` 1
-      _ <- ending (handleNext box (\_ -> failed) :: Behavior ())
+      _ <- ending (handleNext box (const failed) :: Behavior ())
       count `shouldReturn` 1
       void (atomically (receive box))
       count `shouldReturn` 0
