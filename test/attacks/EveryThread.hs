@@ -8,6 +8,7 @@ module EveryThread (attack) where
 
 import Control.Concurrent
 import Control.Exception
+import Control.Exception.Base (nonTermination)
 import Control.Monad (forM_, forever, replicateM, unless, void, when)
 import Data.IORef
 import System.Exit (ExitCode (..))
@@ -100,7 +101,7 @@ attack = do
     , toException (ExitFailure 3)
     , toException BlockedIndefinitelyOnSTM
     , toException BlockedIndefinitelyOnMVar
-    , toException NonTermination
+    , nonTermination
     , toException Failed
     , toException (StoppedWithFault (toException ThreadKilled) (toException (Boom 2)))
     , toException (ErrorCall undefined)

@@ -14,7 +14,7 @@ import Control.Exception
 import Control.Monad (forM, forM_, forever, unless, void, when)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (isInfixOf, isPrefixOf, sortOn, stripPrefix)
+import Data.List (isInfixOf, isSuffixOf, sortOn, stripPrefix)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust, listToMaybe, maybeToList)
 import GHC.Conc (getUncaughtExceptionHandler, setUncaughtExceptionHandler)
@@ -34,7 +34,7 @@ import Behavior.Trace
 attack :: IO ()
 attack = do
   kinds <- truth 4711 1000
-  promise ("stopped by " ++ show kinds) (all (`Map.member` kinds) ["SiblingFinished", "SiblingFailed", "SiblingFailed \"sensor\"", "TimeLimit", "FromOutside", "SignalChanged", "WasAbandoned"])
+  promise ("stopped by " ++ show kinds) (all (`Map.member` kinds) ["SiblingFinished", "SiblingFailed", "TimeLimit", "FromOutside", "SignalChanged", "WasAbandoned"])
 
 -- | That many random programs, from this seed. Gives by what spans were stopped, and how often.
 truth :: Int -> Int -> IO (Map.Map String Int)
@@ -58,17 +58,18 @@ truth seed0 count = bracket getUncaughtExceptionHandler setUncaughtExceptionHand
           threadDelay w
           let e = if odd (k + i) then toException (Boom (-i)) else toException ThreadKilled
           t <- now
-          add (outside world) (t, either id id (shown e))
+          add (outside world) (t, displayException e)
           throwTo thread e
     changing <- forkIO (forM_ [1 ..] $ \n -> forM_ (zip [0 ..] (variables world)) (uncurry (change world n)) >> threadDelay pause)
-    _ <- endsWithin 20000 what (\thread -> forM_ (zip [1 :: Int ..] waits) (throwing thread)) $
+    _ <- endsWithin 20000 what (forM_ (zip [1 :: Int ..] waits) . throwing) $
       withTraceOptions defaultTraceOptions {withOperators = detailed} [keep] (timeout limit program)
     killThread changing
     events <- reverse <$> readIORef received
     awaitNoThreads what
     modifyIORef' kinds (Map.unionWith (+) (Map.fromListWith (+) [(kindOf c, 1) | Ended _ _ (StoppedBy c) <- events]))
-    -- (A recovery that ends at once, and whose condition stays true, makes more than a queue has room for.)
-    unless (or [True | Lost _ <- events]) $ compared world events >>= mapM_ (\wrong -> broken (what ++ ": " ++ wrong))
+    -- (A recovery that ends at once, and whose condition stays true, makes more than is compared, or than a queue has
+    -- room for.)
+    unless (length events > 4000) $ compared world events >>= mapM_ (\wrong -> broken (what ++ ": " ++ wrong))
   readIORef kinds
  where
   kindOf = \case
@@ -102,11 +103,6 @@ change world n i v = uninterruptibleMask_ $ do
   t <- now
   atomically (writeTVar v n)
   now >>= add (writes world) . Write i n t
-
-shown :: SomeException -> Either String String
-shown e
-  | Just (Boom n) <- fromException e = Right (displayException (Boom n))
-  | otherwise = Right (displayException e)
 
 -- | A behaviour with a name that records how it ran.
 recorded :: World -> String -> IO a -> IO a
@@ -155,16 +151,16 @@ randomProgram below world = tree
       9 -> two (\a b -> Signal.switch ((`mod` 3) <$> signal) (\m -> if m == 0 then a else b)) "branch" "branch"
       10 -> two (\a b -> Signal.teleoReactive [(isOdd, a), (not <$> isOdd, b)]) "rule 1" "rule 2"
       11 -> (\a -> Signal.whileHolding (Signal.named "even" (even <$> signal)) a ? pure ()) <$> child "branch"
-      12 -> two (\a b -> Signal.insteadWhen (Signal.named "late" ((> 12) <$> signal)) a b) "emergency" "branch"
+      12 -> two (Signal.insteadWhen (Signal.named "late" ((> 12) <$> signal))) "emergency" "branch"
       13 -> two (\a b -> decide (\ends -> if length (filter isJust ends) == 2 then Just (pure ()) else Nothing) [a, b]) "1" "2"
       14 -> (\a -> Time.timeout limit a ? pure ()) <$> child "branch"
       15 -> two (\a b -> withInbox 3 (\deliver -> forever (deliver () >> Time.sleep 0.0006)) (\inbox -> onMessage inbox (\() -> pure () <$ a) b)) "handler" "task"
       16 -> two (\a b -> a `finally` Time.cleanupWithin limit (b ? pure ())) "first" "branch"
-      17 -> (\a -> Time.abandoning 0.0001 a) <$> child "~branch"
+      17 -> Time.abandoning 0.0001 <$> child "~branch"
       18 -> two (\a b -> pinned (Signal.withShared isOdd (\shared -> Signal.monitor shared a b))) "recovery" "task"
       _ -> two (Signal.rSelect (dying <$> isOdd <*> signal)) "left" "right"
   -- A sensor that faults.
-  dying b n = if n > 4 then throw (Boom 1) else b
+  dying b n = if n > 2 then throw (Boom 1) else b
   leaf p = do
     kind <- below 8
     d <- below 900
@@ -200,7 +196,7 @@ compared world events = do
       spans = [w | Began s <- events, w <- ofSpan s]
       ofSpan s = concat
         [ wrong "it has not one end" (s, found) | let found = IntMap.findWithDefault [] (spanNumber s) endOf', length found /= 1, not (null found && isLoose s) ]
-        ++ concat [wrong "it is not within its parent" (s, o) | o <- take 1 (around s), not (isLoose s), not (within s o)]
+        ++ concat [wrong "it is not within its parent" (s, o) | not (isLoose s), o <- take 1 (around s), not (within s o)]
         ++ (if spanKind s == Named && not (isLoose s) then ofNamed s else [])
       within s o = spanBegan o <= spanBegan s && and [t <= t' | (t, _) <- theEnd s, (t', _) <- theEnd o]
       theEnd s = IntMap.findWithDefault [] (spanNumber s) endOf'
@@ -210,7 +206,7 @@ compared world events = do
           concat [wrong "its beginning" (s, r) | spanBegan s > runBegan r]
             ++ concat [wrong "its end" (s, t, r) | (t, _) <- theEnd s, t < runEnded r]
             ++ concat [wrong "how it ended" (s, end, r) | (_, end) <- theEnd s, not (agree end (runEnd r))]
-            ++ concat [wrong "its cause" (s, c, r, around s) | (_, StoppedBy c) <- theEnd s, runEnd r == Cancelled, not (true s r c)]
+            ++ concat [wrong "its cause" (s, c, r, around s) | runEnd r == Cancelled, (_, StoppedBy c) <- theEnd s, not (true s r c)]
       agree end h = case end of
         Succeeded -> h == Returned
         FailedWith _ -> h == Failure
@@ -221,7 +217,7 @@ compared world events = do
       namedAround = filter ((== Named) . spanKind) . around
       true s r = \case
         SiblingFinished name -> or [runEnd b == Returned && runEnded b <= runEnded r | o <- namedAround s, part <- parts name, b <- siblings o part]
-        SiblingFailed "sensor" -> or [variable w < 2 && written w > 4 && before w <= runEnded r | w <- changes]
+        SiblingFailed "sensor" -> or [variable w < 2 && written w > 2 && before w <= runEnded r | w <- changes]
         SiblingFailed name -> or [runEnd b `elem` [Failure, Fault] && runEnded b <= runEnded r | o <- namedAround s, part <- parts name, b <- siblings o part]
         TimeLimit limit -> limit == 0.0007 && or [runEnded r >= spanBegan o + limit | o <- namedAround s]
         FromOutside "<<timeout>>" -> True
@@ -237,14 +233,13 @@ compared world events = do
       ofReaction r =
         concat [wrong "values that were not together" r | not (together (reactionChanges r))]
           ++ concat [wrong "a value that its signal did not have" (r, c) | c <- reactionChanges r, Just i <- [stripPrefix "s" (changeSignal c) >>= readMaybe], Just x <- [readMaybe (changeAfter c)], not (had i x (maybe 0 spanBegan (parent r)) (reactionTime r))]
-          ++ concat [wrong "it started something else" (r, s) | Just name <- [reactionStarts r], Began s <- events, spanKind s == Named, spanReaction s == Just (reactionNumber r), not (("/" ++ name) `isSuffix` spanName s), not ("~" `isInfixOf` spanName s)]
-      isSuffix end text = reverse end `isPrefixOf` reverse text
+          ++ concat [wrong "it started something else" (r, s) | Just name <- [reactionStarts r], Began s <- events, spanKind s == Named, spanReaction s == Just (reactionNumber r), not (("/" ++ name) `isSuffixOf` spanName s), not ("~" `isInfixOf` spanName s)]
       parent r = case reactionParent r of
         Inside n -> IntMap.lookup n begun
         _ -> Nothing
       -- It was written before the second time, and not overwritten before the first.
       had i x from to = (x == 0 || or [before w <= to | w <- changes, variable w == i, written w == x]) && and [after w >= from | w <- changes, variable w == i, written w == x + 1]
-      together cs = and [odd x == (changeAfter o == "True") | (c, o) <- zip cs (drop 1 cs), Just x <- [readMaybe (changeAfter c) :: Maybe Int], changeSignal o == changeSignal c ++ " odd"]
+      together cs = and [odd x == (changeAfter o == "True") | (c, o) <- zip cs (drop 1 cs), changeSignal o == changeSignal c ++ " odd", Just x <- [readMaybe (changeAfter c) :: Maybe Int]]
       lostRuns = [wrongRun | (name, rs) <- Map.toList runsOf, let known = length (Map.findWithDefault [] name spansOf), length rs > known, not ("~" `isInfixOf` name), wrongRun <- wrong "runs without a span" (name, length rs, known)]
       doubled = [n | (n, _ : _ : _) <- Map.toList reactions]
       all' = spans ++ ofReactions ++ lostRuns ++ concat [wrong "reactions that came twice" doubled | not (null doubled)]
