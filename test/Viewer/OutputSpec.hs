@@ -85,7 +85,7 @@ spec = do
     results `shouldBe` (Left (ErrorCall "lost a wheel") :: Either ErrorCall (), [True, True])
     last (screen output) `shouldBe` "after"
 
-  it "goes where the program sends it" . withHandle $ \file -> do
+  it "goes where the program sends it" . withFd $ \file -> do
     (_, output) <- inTerminal $ \h _ -> do
       withTerminal h $ \sink -> do
         sink (take 3 mission)
@@ -93,7 +93,7 @@ spec = do
       putStrLn "to the file" >> hFlush stdout
     screen output `shouldSatisfy` notElem "to the file"
  where
-  withHandle = bracket (openFd "/dev/null" WriteOnly Nothing defaultFileFlags) closeFd
+  withFd = bracket (openFile "/dev/null" WriteMode >>= handleToFd) closeFd
 
 -- Runs the action with a handle of a terminal, which the standard output and the standard error are too; and with an action that
 -- waits until this text has been written to the terminal. Gives all that has been written.
