@@ -172,6 +172,36 @@ build() {
   esac >&2
 }
 
+# with_packages COMMAND...: runs the command where GHC finds this package's libraries, once they
+# are built, and those that they and the tests need.
+with_packages() {
+  case $BEHAVIOR_TOOLCHAIN in
+    cabal*) run_cabal exec -v0 --enable-tests -- "$@" ;;
+    stack*) run_stack exec -- "$@" ;;
+  esac
+}
+
+# build_libraries: all libraries of this package, and what the tests need.
+build_libraries() {
+  find_toolchain
+  case $BEHAVIOR_TOOLCHAIN in
+    cabal*) run_cabal build --enable-tests --only-dependencies all >&2 ;;
+    stack*) run_stack build --test --only-dependencies >&2 ;;
+  esac
+  build lib:behavior-lang lib:quickcheck lib:unliftio lib:viewer
+}
+
+# stanza NAME: the lines of this common stanza of the package description.
+stanza() {
+  sed -n "/^common $1\$/,/^\$/p" behavior-lang.cabal
+}
+
+# The folders of the tests, and of the examples that they compile, as options of GHC.
+test_folders() {
+  for name in tests world viewing tool; do stanza $name; done |
+    awk '/hs-source-dirs:/ { on = 1; sub(/.*:/, "") } /:/ { on = 0 } on { for (i = 1; i <= NF; i++) print "-i" $i }'
+}
+
 # binary KIND:NAME: prints the path of the built program.
 binary() {
   case $BEHAVIOR_TOOLCHAIN in

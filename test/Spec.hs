@@ -1,3 +1,6 @@
+-- |
+-- What depends on the runtime: threads are started, and exceptions reach them (also those of a
+-- simulation are real ones).
 module Main (main) where
 
 import Test.Hspec
@@ -55,21 +58,21 @@ import qualified Paper.DoorsSpec
 import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
-import qualified Promises.PromisesSimSpec
 import qualified Reality.RealitySpec
-import qualified SemanticsSpec
 import qualified Sim.DeliverySpec
 import qualified Sim.EndSpec
-import qualified Sim.ExploreSpaceSpec
 import qualified Sim.ExploreSpec
 import qualified Sim.MockSpec
 import qualified Sim.QuickCheckSpec
 import qualified Sim.RecordSpec
 import qualified Sim.SimulateSpec
 import qualified Sim.SlipSpec
+<<<<<<< HEAD
 import qualified Sim.VacuousSpec
 import qualified Trace.MessagesSpec
 import qualified Trace.ProgramsSpec
+=======
+>>>>>>> 71f68d9 (Tests: compiled without optimization and once; random programs run under one runtime)
 import qualified Trace.SinkSpec
 import qualified Trace.TraceSpec
 
@@ -125,7 +128,6 @@ main = hspec $ do
     Sim.DeliverySpec.spec
     Sim.EndSpec.spec
     Sim.SlipSpec.spec
-    Sim.ExploreSpaceSpec.spec
     Sim.ExploreSpec.spec
     Sim.RecordSpec.spec
     Sim.MockSpec.spec
@@ -135,12 +137,15 @@ main = hspec $ do
     Trace.TraceSpec.spec
     Trace.SinkSpec.spec
   describe "Reality" Reality.RealitySpec.spec
+<<<<<<< HEAD
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
   describe "Specification" SemanticsSpec.spec
   describe "Names" OrdinaryWordsSpec.spec
   describe "Traces of random programs" $ do
     Trace.ProgramsSpec.spec
     Trace.MessagesSpec.spec
+=======
+>>>>>>> 71f68d9 (Tests: compiled without optimization and once; random programs run under one runtime)
   describe "The paper" $ do
     Paper.ListingsSpec.spec
     Paper.DoorsSpec.spec

@@ -1,3 +1,4 @@
+{-# OPTIONS_GHC -O1 #-}
 -- |
 -- Stop requests, views, and the states of filters.
 module Semantics.Filter

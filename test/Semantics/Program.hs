@@ -1,3 +1,4 @@
+{-# OPTIONS_GHC -O1 #-}
 -- |
 -- Programs of the language, as plain data.
 --

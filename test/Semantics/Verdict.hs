@@ -1,3 +1,4 @@
+{-# OPTIONS_GHC -O1 #-}
 -- |
 -- The decisions of operators.
 module Semantics.Verdict
