@@ -67,12 +67,7 @@ import qualified Sim.QuickCheckSpec
 import qualified Sim.RecordSpec
 import qualified Sim.SimulateSpec
 import qualified Sim.SlipSpec
-<<<<<<< HEAD
 import qualified Sim.VacuousSpec
-import qualified Trace.MessagesSpec
-import qualified Trace.ProgramsSpec
-=======
->>>>>>> 71f68d9 (Tests: compiled without optimization and once; random programs run under one runtime)
 import qualified Trace.SinkSpec
 import qualified Trace.TraceSpec
 
@@ -137,15 +132,7 @@ main = hspec $ do
     Trace.TraceSpec.spec
     Trace.SinkSpec.spec
   describe "Reality" Reality.RealitySpec.spec
-<<<<<<< HEAD
-  describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
-  describe "Specification" SemanticsSpec.spec
   describe "Names" OrdinaryWordsSpec.spec
-  describe "Traces of random programs" $ do
-    Trace.ProgramsSpec.spec
-    Trace.MessagesSpec.spec
-=======
->>>>>>> 71f68d9 (Tests: compiled without optimization and once; random programs run under one runtime)
   describe "The paper" $ do
     Paper.ListingsSpec.spec
     Paper.DoorsSpec.spec

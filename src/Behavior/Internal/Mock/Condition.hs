@@ -30,6 +30,7 @@ import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..)
 -- $setup
 -- >>> import Behavior
 -- >>> import qualified Behavior.Signal as Signal
+-- >>> import Behavior.Sim
 -- >>> import Behavior.Sim.Mock
 -- >>> mock <- newMock
 
@@ -72,9 +73,10 @@ condition mock name = partialCondition mock name . map (fmap Just)
 
 -- | A 'condition' that has no value at some times ('Nothing').
 --
--- >>> beacon <- partialCondition mock "beacon" [(0, Just 'a'), (0.001, Nothing)]
--- >>> Signal.waitUntil ((== 'b') <$> signal beacon)
--- *** Exception: FailedBecause "beacon has no value any more"
+-- >>> beacon <- partialCondition mock "beacon" [(0, Just 'a'), (5, Nothing)]
+-- >>> run <- simulate (Signal.waitUntil ((== 'b') <$> signal beacon))
+-- >>> putStrLn (explain (outcome run))
+-- it failed: beacon has no value any more
 --
 -- @since 0.1.0.0
 partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
