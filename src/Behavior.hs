@@ -109,9 +109,11 @@
 --
 -- A behaviour that never reaches a point where it can be interrupted does not stop: a loop
 -- that never allocates (compile with @-fno-omit-yields -fno-full-laziness@: the page
--- @docs\/interruption.md@ says why), a safe foreign call (import it @interruptible@). A behaviour cannot rely on recovering from
--- 'Control.Exception.BlockedIndefinitelyOnMVar' and similar exceptions, because GHC throws
--- them to the operator that waits for the behaviour, too.
+-- @docs\/interruption.md@ says why), a safe foreign call (import it @interruptible@). A behaviour
+-- cannot rely on recovering from 'Control.Exception.BlockedIndefinitelyOnMVar' and similar
+-- exceptions, because GHC throws them to the operator that waits for the behaviour, too. An operator
+-- does not belong in a lazy value ('System.IO.Unsafe.unsafeInterleaveIO'): if it is stopped while that
+-- is evaluated, GHC keeps the stop request in the value, and throws it to whoever evaluates it later.
 module Behavior
   ( -- * Behaviours
     Behavior

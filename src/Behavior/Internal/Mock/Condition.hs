@@ -76,7 +76,7 @@ condition mock name = partialCondition mock name . map (fmap Just)
 -- >>> beacon <- partialCondition mock "beacon" [(0, Just 'a'), (5, Nothing)]
 -- >>> run <- simulate (Signal.waitUntil ((== 'b') <$> signal beacon))
 -- >>> putStrLn (explain (outcome run))
--- it failed: beacon has no value any more
+-- it failed: the behaviour failed: beacon has no value any more
 --
 -- @since 0.1.0.0
 partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)

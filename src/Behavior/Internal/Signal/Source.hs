@@ -179,6 +179,9 @@ data Worker = Worker
 -- be one, limit that by 'Behavior.Time.timeout'). If it retries later, the signal no longer has
 -- a value, and the operator fails. What the transaction throws, the operator throws.
 --
+-- The transaction should only read: it is run whenever a variable that it has read changes, and in a
+-- trace more often than without one. (What is taken from a queue is a message: "Behavior.Message".)
+--
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar)
 -- >>> battery <- newTVarIO (5 :: Int)
 -- >>> Signal.waitUntil ((< 10) <$> Signal.watching (readTVar battery))
