@@ -35,7 +35,8 @@ import Behavior.Internal.Scope
 --
 -- It has no effect in a simulation, with one capability, and without @-threaded@. If
 -- 'Control.Concurrent.setNumCapabilities' takes the capability away, GHC moves all of these threads
--- to another.
+-- to another. (Rather set their number by the option @-N@: the page @docs\/performance.md@ says how a
+-- program can hang when it ends.)
 --
 -- >>> import Control.Concurrent (myThreadId, threadCapability)
 -- >>> pinned (myThreadId >>= fmap snd . threadCapability)
