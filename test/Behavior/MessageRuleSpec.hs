@@ -134,7 +134,7 @@ drone = do
     dangers <- newIORef (0 :: Int)
     withInbox 1000 (delivering [1 .. 300 :: Int]) $ \box -> do
       handling <- messageRule box $ \m -> modifyIORef' begun (+ 1) >> yield >> pure (modifyTVar' done (m :))
-      let flee = yield >> atomically (writeTVar danger False) >> hang
+      let flee = forever (atomically (readTVar danger >>= check) >> yield >> atomically (writeTVar danger False))
           alarms = forever (replicateM_ 3 yield >> modifyIORef' dangers (+ 1) >> atomically (writeTVar danger True) >> atomically (readTVar danger >>= check . not))
       alarms ||| Signal.teleoReactive [(Signal.watching (readTVar danger), flee), handling, (pure True, readTVarIO done >>= \all' -> unless (length all' == 300) hang)]
     reverse <$> readTVarIO done `shouldReturn` [1 .. 300]

@@ -18,7 +18,7 @@ module Behavior.Internal.Inbox
   , dropped
   ) where
 
-import Control.Concurrent.STM (STM, TVar, modifyTVar', newTVarIO, readTVar, retry, writeTVar)
+import Control.Concurrent.STM (STM, TVar, check, modifyTVar', newTVarIO, readTVar, retry, writeTVar)
 import Control.Exception (ErrorCall (..), bracket, finally, mask, onException, throwIO)
 import Control.Monad (forever, when)
 import Data.Foldable (for_, traverse_)
@@ -188,8 +188,9 @@ messageRule :: Inbox e -> (e -> Behavior (STM ())) -> Behavior (Signal Bool, Beh
 messageRule inbox handle = do
   here <- newTVarIO 0
   let ours = inbox {handling = here :| NonEmpty.toList (handling inbox)}
-  pure ((> 0) <$> counting "unhandled" inbox (unhandled ours), forever (inBranch (handleNext ours handle)))
+  pure ((> 0) <$> counting "unhandled" inbox (unhandled ours), forever (someWaits >> inBranch (handleNext ours handle)))
  where
+  someWaits = atomically (queued inbox >>= check . (> 0))
   -- A handler that completes although its stop was requested does not keep the rule from being stopped.
   inBranch act = structured "messageRule" $ \scope ->
     branch scope (Label "messageRule" "handler") act >>= fmap (endedBy "handler") . atomically . outcome
