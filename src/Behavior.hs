@@ -113,7 +113,7 @@
 -- cannot rely on recovering from 'Control.Exception.BlockedIndefinitelyOnMVar' and similar
 -- exceptions, because GHC throws them to the operator that waits for the behaviour, too. An operator
 -- does not belong in a lazy value ('System.IO.Unsafe.unsafeInterleaveIO'): if it is stopped while that
--- is evaluated, GHC keeps the stop request in the value, and throws it to whoever evaluates it later.
+-- is evaluated, GHC keeps the stop request in the value, and throws it to the thread that evaluates it later.
 module Behavior
   ( -- * Behaviours
     Behavior

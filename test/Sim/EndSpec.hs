@@ -94,7 +94,7 @@ ends = do
     let comesTrue = unsafeIOToSTM (atomicModifyIORef' looks (\n -> (n + 1, n >= 4))) >>= check
     run <- simulateWith defaultSimOptions {endAt = 60} (atomically comesTrue)
     explain (outcome run) `shouldSatisfy` ("something outside of the simulation" `isPrefixOf`)
-  it "a run without an end of its own ends then, and it is told who waits for what" $ do
+  it "a run without an end of its own ends then, and the report says who waits for what" $ do
     run <- simulateWith defaultSimOptions {endAt = 60} (both (forever (sleep 7) :: Behavior ()) (named "dock" (atomically retry)) :: Behavior ())
     (lines (explain (outcome run)), finished run)
       `shouldBe` ( [ "the virtual time has come to the end that was set"

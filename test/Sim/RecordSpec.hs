@@ -250,7 +250,7 @@ whiles = do
       holds (whenever (endOf "drive" `during` (being "low" True `heldFor` 0.5)) (withinSeconds 0 (startOf "charge"))) day `shouldBe` True
     it "are those of the interval, if that is one of these" $
       map (\s -> countOf (startOf "charge" `during` (being "low" True `heldFor` 0.5 `heldFor` s)) day) [0.4, 0.5] `shouldBe` [1, 0]
-    it "are told with the time at which they begin" $
+    it "are shown with the time at which they begin" $
       (Record ["low", "drive"] [line 0 "drive" Begins, line 4 "low" (Becomes "True")], held 0.1)
         `refutedBy` ["This does not hold: never \"drive\" is running while \"low\" is True for over 0.1 s.", "It was so at 4.1 s:"]
   describe "shortly after a moment" $ do

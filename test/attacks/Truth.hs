@@ -2,7 +2,7 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Whether a trace tells what really happened. In random programs, which receive exceptions at random
+-- Whether a trace shows what really happened. In random programs, which receive exceptions at random
 -- moments while their signals change, each named behaviour keeps its own record: when it began, when and how it
 -- ended; so does the thread that changes the signals. Expected: each span has that beginning and that end,
 -- within its parent's; what it says it was stopped by had really happened before; and the values of a reaction
@@ -173,7 +173,7 @@ randomProgram below world = tree
       5 -> Time.sleep 3600 `onException` when (d > 600) (throwIO (Boom 3))
       _ -> Time.sleep 3600
 
--- | What the trace tells wrong.
+-- | What the trace shows wrongly.
 compared :: World -> [Event] -> IO (Maybe String)
 compared world events = do
   real <- readIORef (runs world)

@@ -15,6 +15,7 @@ import Behavior.Trace
 -- | The texts that were seen last.
 type Texts = Map String String
 
+-- | No text was seen yet.
 noTexts :: Texts
 noTexts = Map.empty
 
