@@ -260,8 +260,9 @@ spinning = do
   closeFd input
   printed <- fdToHandle output
   hGetLine printed `shouldReturn` "now"
-  -- (The child looks at a clock that a test cannot advance.)
-  let untilEnded = signalProcess sigTERM child >> getProcessStatus False False child >>= maybe (threadDelay 20000 >> untilEnded) pure
+  -- (The child looks at a clock that a test cannot advance. Without -threaded GHC keeps 16 signals that have no handler
+  -- yet, and ends the program at the next.)
+  let untilEnded = signalProcess sigTERM child >> getProcessStatus False False child >>= maybe (threadDelay 250000 >> untilEnded) pure
   (,) <$> untilEnded <*> hGetContents printed
 
 -- | Raises it without letting another Haskell thread run.

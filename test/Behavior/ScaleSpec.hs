@@ -2,6 +2,7 @@
 -- Work that grows with the number of branches, traces or filters, and not with its square.
 module Behavior.ScaleSpec (spec) where
 
+import Control.Concurrent.MVar (newEmptyMVar, putMVar, readMVar)
 import Control.Monad (replicateM, replicateM_)
 import Data.Foldable (for_)
 import System.CPUTime (getCPUTime)
@@ -45,11 +46,12 @@ children = do
   it "the number of its children that fork at the same time" $
     (6000, 24000) `takesAtMost` 9 $ \n ->
       processorTime . scoped $ \nursery -> do
-        begin <- newTVarIO False
+        -- (No TVar: without -threaded, each thread that goes on would wake all the others.)
+        begin <- newEmptyMVar
         forking <- replicateM n . fork nursery $ do
-          atomically (readTVar begin >>= check)
+          readMVar begin
           fork nursery (pure ()) >>= atomically . await
-        atomically (writeTVar begin True)
+        putMVar begin ()
         for_ forking (atomically . await)
 
 -- (More of them work more than in proportion: docs/signals.md.)

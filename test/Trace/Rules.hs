@@ -69,6 +69,7 @@ indexed record =
  where
   finishes = case Sim.outcome (whole record) of
     Sim.OutOfTime _ -> False
+    Sim.Deadlock _ -> False
     _ -> True
   starts = Map.fromList [(spanNumber s, (at, thread, s)) | (at, Received True thread (Began s)) <- entries record]
   byName = Map.fromList [(spanName s, spanNumber s) | (_, _, s) <- Map.elems starts, spanKind s == Named]

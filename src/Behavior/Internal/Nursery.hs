@@ -23,6 +23,7 @@ module Behavior.Internal.Nursery
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), Exception (..), SomeException, finally, mask_, throwIO)
 import Control.Monad (foldM, unless, (>=>))
+import Control.Monad.Catch (MonadThrow)
 import Data.Foldable (asum, traverse_)
 
 import Behavior.Internal.Failure
@@ -159,17 +160,19 @@ thrownBy = \case
 fork :: Nursery -> Behavior a -> Behavior (Child a)
 fork nursery act = do
   accepted <- newEmptyTMVarIO
-  atomically $
-    readTVar (stage nursery) >>= \case
-      Open -> request nursery (Fork act accepted)
-      Ending -> failEnding
-      Closed -> throwSTM (ErrorCall "fork: the nursery's scoped behaviour has ended")
+  -- (Without -threaded, GHC wakes those that wait for a variable also after a transaction that has only
+  -- read it. So this is none: if the stage changes before the request, that is not served.)
+  readTVarIO (stage nursery) >>= \case
+    Open -> atomically (request nursery (Fork act accepted))
+    Ending -> failEnding
+    Closed -> throwIO (ErrorCall "fork: the nursery's scoped behaviour has ended")
   Child nursery <$> atomically (takeTMVar accepted `orElse` unlessOpen)
  where
   unlessOpen =
     readTVar (stage nursery) >>= \case
       Open -> retry
       _ -> failEnding
+  failEnding :: MonadThrow m => m a
   failEnding = failWith "fork: the nursery's scoped behaviour is ending"
 
 -- | The result of a child; retries until the child has ended, cleanup included.
@@ -218,11 +221,10 @@ tryAwait (Child _ child) = fmap ending <$> tryReadOutcomeSTM child
 -- @since 0.1.0.0
 requestStop :: Child a -> Behavior ()
 requestStop (Child nursery child) =
-  atomically $
-    readTVar (stage nursery) >>= \case
-      Open -> request nursery (Stop (SomeBranch child))
-      -- It is being stopped with the rest, or has ended.
-      _ -> pure ()
+  readTVarIO (stage nursery) >>= \case
+    Open -> atomically (request nursery (Stop (SomeBranch child)))
+    -- It is being stopped with the rest, or has ended.
+    _ -> pure ()
 
 request :: Nursery -> Request -> STM ()
 request nursery new = modifyTVar' (requests nursery) (new :)
