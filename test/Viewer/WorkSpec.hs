@@ -28,7 +28,7 @@ spec = do
   describe "Twice as many events take about twice as much work (if not four times)" . forM_ shapes $ \(shape, made) ->
     describe shape . forM_ views $ \(view, work) -> it view $ do
       -- (Logarithms make it a little more than two.)
-      [less, more] <- mapM (\n -> allocatedBy work (made n)) [2000, 4000]
+      [less, more] <- mapM (allocatedBy work . made) [2000, 4000]
       fromIntegral more / fromIntegral less `shouldSatisfy` (< (2.5 :: Double))
   describe "A hundred thousand spans in each other" . forM_ views $ \(view, work) ->
     it view $ evaluate (work (inEachOther 100000 Named Succeeded)) >>= (`shouldSatisfy` (> 0))
@@ -70,11 +70,11 @@ views =
   [ ("the tree", size . renderTree . recording)
   , ("the summary", size . renderSummary . summary . recording)
   , ("the differences", \events -> let r = recording events in size (renderDifference (difference r r)))
-  , ("the differences from nothing", \events -> size (renderDifference (difference (recording []) (recording events))))
+  , ("the differences from nothing", size . renderDifference . difference (recording []) . recording)
   , ("the trace-event format", Bytes.length . renderTraceEvents . recording)
   , ("the timeline", Text.length . timeline . recording)
   , ("the lines", size . concatMap plainLine)
-  , ("the tree in the terminal", \events -> size (concatMap plain (treeLines 50 100 0 (foldl' watch nothingYet events))))
+  , ("the tree in the terminal", size . concatMap plain . treeLines 50 100 0 . foldl' watch nothingYet)
   , ("the file", either (const 0) (\(_, events, _) -> fromIntegral (length events)) . parseTrace . renderTrace header)
   , ("without operators", fromIntegral . length . show . withoutOperators)
   ]
