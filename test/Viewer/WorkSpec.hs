@@ -49,6 +49,7 @@ shapes =
   , ("spans at the same time", sideBySide)
   , ("interruptions after each other", interrupted)
   , ("reactions", \n -> ended 1 Top "wait" 0 Nothing (time n) Succeeded ++ [reaction k 1 | k <- [2 .. n]])
+  , ("spans in each other after a loss", \n -> Lost 1 : inEachOther n Named Succeeded)
   , ("losses", \n -> replicate n (Lost 1))
   ]
  where

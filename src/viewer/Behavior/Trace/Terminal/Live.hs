@@ -148,10 +148,11 @@ ended s t end live = case spanParent s of
  where
   number = spanNumber s
   self = IntMap.lookup number (liveActive live)
-  -- After a loss there may be spans in it whose end was lost.
+  -- After a loss there may be spans in it whose end was lost. They began later.
   others
-    | liveLost live > 0 = IntMap.filter (not . inside number (liveActive live)) (IntMap.delete number (liveActive live))
+    | liveLost live > 0 = IntMap.union earlier (IntMap.filter (not . inside number (liveActive live)) later)
     | otherwise = IntMap.delete number (liveActive live)
+  (earlier, later) = IntMap.split number (liveActive live)
   latest known = keep maxDone (done : known)
   done =
     Done

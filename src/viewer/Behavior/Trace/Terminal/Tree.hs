@@ -46,14 +46,14 @@ fitting rows ranked
   importance (k, (rank, _)) = (rank, if rank < 2 then k else negate k :: Int)
 
 activeLines :: Int -> Seconds -> Live -> [Ranked]
-activeLines width time live = doneLines width 0 (liveDone live) (liveDoneCount live) ++ concatMap (node 0) tops
+activeLines width time live = doneLines width 0 (liveDone live) (liveDoneCount live) ++ foldr (node 0) [] tops
  where
   (tops, children) = byParent (liveActive live)
-  node :: Int -> Active -> [Ranked]
-  node depth a =
+  node :: Int -> Active -> [Ranked] -> [Ranked]
+  node depth a rest =
     (rank, indent width depth ++ [(Good, "● "), (Strong, room width depth (nameText (spanName s))), (Normal, since)])
       : doneLines width (depth + 1) (activeDone a) (activeDoneCount a)
-      ++ concatMap (node (depth + 1)) (IntMap.findWithDefault [] (spanNumber s) children)
+      ++ foldr (node (depth + 1)) rest (IntMap.findWithDefault [] (spanNumber s) children)
    where
     s = activeSpan a
     since = " " ++ clock (time - spanBegan s)
@@ -63,7 +63,7 @@ activeLines width time live = doneLines width 0 (liveDone live) (liveDoneCount l
 byParent :: IntMap Active -> ([Active], IntMap [Active])
 byParent active =
   ( filter ((== Nothing) . parentOf) (IntMap.elems active)
-  , IntMap.fromListWith (flip (++)) [(p, [a]) | a <- IntMap.elems active, Just p <- [parentOf a]]
+  , IntMap.fromListWith (++) [(p, [a]) | a <- reverse (IntMap.elems active), Just p <- [parentOf a]]
   )
  where
   parentOf a = case spanParent (activeSpan a) of
