@@ -3,12 +3,13 @@
 module Viewer.WorkSpec (spec) where
 
 import Control.Exception (evaluate)
-import Control.Monad (forM_)
+import Control.Monad (forM_, (>=>))
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Int (Int64)
 import Data.List (foldl')
 import qualified Data.Text.Lazy as Text
 import System.Mem (getAllocationCounter, setAllocationCounter)
+import System.Timeout (timeout)
 import Test.Hspec
 
 import Behavior.Time (Seconds)
@@ -23,8 +24,9 @@ import Behavior.Trace.TraceEvents
 import Behavior.Trace.Tree
 import Viewer.Examples
 
+-- (What takes time but no memory is noticed by the watchdog.)
 spec :: Spec
-spec = do
+spec = around_ (timeout 20000000 >=> maybe (expectationFailure "not over after 20 s") pure) $ do
   describe "Twice as many events take about twice as much work (if not four times)" . forM_ shapes $ \(shape, made) ->
     describe shape . forM_ views $ \(view, work) -> it view $ do
       -- (Logarithms make it a little more than two.)
