@@ -2,6 +2,8 @@
 -- becomes low, and no one is at home.
 module Main (main) where
 
+import Control.Monad (unless)
+
 import Behavior.Sim
 import Behavior.Sim.Mock
 import Mission
@@ -16,7 +18,7 @@ main = do
     ring <- action world "hand over" [fails "no one opens" `taking` 30]
     down <- action world "put down" [succeeds]
     full <- action world "charge" [succeeds `taking` 60 `causing` set level 100]
-    _ <-
+    run <-
       simulated . mission $
         Robot
           { battery = signal level
@@ -26,8 +28,10 @@ main = do
           , putDown = down
           , charge = full
           }
+    well run
     world `shouldRecord` whenever (becoming "battery" (19 :: Int)) (withinSeconds 6 (startOf "charge"))
     world `shouldRecord` (startOf "hand over" `comesBefore` startOf "put down" <> exactly 1 (successOf "put down"))
     world `shouldRecord` whenever (becoming "wheels turn" True) (eventually (becoming "wheels turn" False))
     world `shouldRecord` never (running "charge" `overlapping` being "wheels turn" True)
   print report
+  unless (null (reportNeverStarted report)) $ fail "the test does not show what it seems to"

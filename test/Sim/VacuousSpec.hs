@@ -75,6 +75,9 @@ explorations = do
   for_ [randomly 3, exhaustively 1, replaying NonPreemptive, (randomly 1) {planSearch = Shrink NonPreemptive}] $ \plan ->
     it ("is refused, when its property simulates nothing: " ++ show (planSearch plan)) $
       explore plan (\_ -> pure ()) `shouldThrow` saying "the property has simulated nothing"
+  for_ [("endAt", -1, \t o -> o {endAt = t}), ("endAt", 0 / 0, \t o -> o {endAt = t}), ("timerSlip", -1, \t o -> o {timerSlip = t}), ("realTimeLimit", -1, \t o -> o {realTimeLimit = t})] $
+    \(name, t, with) -> it ("is refused, when a run has the " ++ name ++ " " ++ show t) $
+      simulateWith (with t defaultSimOptions) (sleep 1) `shouldThrow` (== ErrorCall (name ++ ": a duration is zero or more seconds, not " ++ show t))
   it "is refused, when its property simulates nothing under one of the schedules" $ do
     runs <- newIORef (0 :: Int)
     let thrice simulated = modifyIORef runs (+ 1) >> readIORef runs >>= \n -> when (n < 3) (void (simulated (sleep 1)))

@@ -7,7 +7,7 @@
 -- >   low      <- condition world "battery low" [(0, False), (5, True)]
 -- >   tidy     <- action world "tidy up" [succeeds `taking` 30 `slowToStop` 1]
 -- >   recharge <- action world "recharge" [succeeds `taking` 20 `causing` set low False]
--- >   _ <- simulate (Signal.monitor (signal low) recharge tidy)
+-- >   simulate (Signal.monitor (signal low) recharge tidy) >>= well
 -- >   world `shouldRecord` whenever (becoming "battery low" True) (withinSeconds 2 (startOf "recharge"))
 -- >   world `shouldRecord` never (running "tidy up" `overlapping` running "recharge")
 --

@@ -13,6 +13,7 @@ module Behavior.Internal.Sim.Simulate
 import Control.Concurrent
 import Control.Exception hiding (Deadlock)
 import Control.Monad (unless, when)
+import Data.Foldable (for_)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
 import Data.Functor.Identity (Identity (..))
@@ -24,6 +25,7 @@ import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Dispatch
 import Behavior.Internal.SafeText (safeShow)
+import Behavior.Internal.Seconds (duration)
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
@@ -63,7 +65,7 @@ import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, t
 simulate :: Behavior a -> IO (Run a)
 simulate = simulateWith defaultSimOptions
 
--- | 'simulate' with the given options.
+-- | 'simulate' with the given options. (A time there that is negative or NaN is refused with an 'ErrorCall'.)
 --
 -- >>> run <- simulateWith defaultSimOptions {scheduled = Seeded 7} (both (sleep 1) (sleep 2))
 -- >>> finished run
@@ -90,6 +92,7 @@ simulateBy o chooser' act = do
   nested <- simulator
   when (isJust nested) . throwIO . ErrorCall $
     "simulate: a simulation inside of a simulation: run the inner behaviour as part of the outer one"
+  for_ [("endAt", endAt o), ("timerSlip", timerSlip o), ("realTimeLimit", realTimeLimit o)] (uncurry duration)
   result <- newIORef Nothing
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
   sim <- newSim o chooser'
