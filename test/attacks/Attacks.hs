@@ -14,6 +14,7 @@ import qualified Messages
 import qualified MutualThrow
 import qualified NestedLimits
 import qualified NurseryRaces
+import qualified Pauses
 import qualified ReactiveThrow
 import qualified SimBusy
 import qualified SimEnds
@@ -52,6 +53,7 @@ attacks =
   , ("MutualThrow", MutualThrow.attack)
   , ("NestedLimits", NestedLimits.attack)
   , ("NurseryRaces", NurseryRaces.attack)
+  , ("Pauses", Pauses.attack)
   , ("ReactiveThrow", ReactiveThrow.attack)
   , ("SimBusy", SimBusy.attack)
   , ("SimEnds", SimEnds.attack)
