@@ -22,7 +22,6 @@ import Data.Aeson.Encoding (Encoding, Series, int, list, pair, pairs)
 import Data.Aeson.Types (Key, Parser, parseEither)
 import Data.ByteString.Builder (Builder, char7)
 import qualified Data.ByteString.Lazy as Bytes
-import qualified Data.ByteString.Lazy.Char8 as Char8
 import Data.List (intercalate)
 import Data.Maybe (fromMaybe)
 import qualified Data.Text as Text
@@ -163,30 +162,6 @@ decodeEvent :: Bytes.ByteString -> Either NoEvent Event
 decodeEvent content
   | nestsDeeperThan 100 content = Left (NotAnEvent "it nests deeper than 100; allowed: an event, which nests 6 deep")
   | otherwise = either (Left . NotJson) Right (eitherDecode content) >>= either (Left . NotAnEvent) Right . parseEither event
-
--- (A parser needs a few hundred bytes of memory for each bracket.)
-nestsDeeperThan :: Int -> Bytes.ByteString -> Bool
-nestsDeeperThan limit content =
-  Char8.count '[' content + Char8.count '{' content > fromIntegral limit && deepest (Char8.foldl' next (Outside 0 0) content) > limit
- where
-  next state c = case state of
-    Outside d m
-      | c == '[' || c == '{' -> Outside (d + 1) (max m (d + 1))
-      | c == ']' || c == '}' -> Outside (d - 1) m
-      | c == '"' -> Within d m
-      | otherwise -> state
-    Within d m
-      | c == '"' -> Outside d m
-      | c == '\\' -> Escaped d m
-      | otherwise -> state
-    Escaped d m -> Within d m
-  deepest state = case state of
-    Outside _ m -> m
-    Within _ m -> m
-    Escaped _ m -> m
-
--- How deep it is there, and at the deepest place before: outside of a text, within one, or after its backslash.
-data Nesting = Outside !Int !Int | Within !Int !Int | Escaped !Int !Int
 
 event :: Value -> Parser Event
 event = withObject "an event" $ \o ->
