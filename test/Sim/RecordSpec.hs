@@ -267,6 +267,9 @@ whiles = do
     for_ [-1, 0 / 0] $ \s -> do
       evaluate (holds (always (being "low" True `heldFor` s)) day) `shouldThrow` (== ErrorCall ("heldFor: zero or more seconds, not " ++ show s))
       evaluate (holds (always (shortlyAfter s (startOf "drive"))) day) `shouldThrow` (== ErrorCall ("shortlyAfter: zero or more seconds, not " ++ show s))
+      -- Also where what is inside of it never happens.
+      evaluate (holds (never (failureOf "charge" `during` (being "low" True `heldFor` s))) day) `shouldThrow` (== ErrorCall ("heldFor: zero or more seconds, not " ++ show s))
+      evaluate (holds (never (failureOf "charge" `during` shortlyAfter s (startOf "drive"))) day) `shouldThrow` (== ErrorCall ("shortlyAfter: zero or more seconds, not " ++ show s))
 
   it "end when the condition loses its value" $ do
     let rows = [line 0 "x" (Becomes "1"), line 1 "x" LosesValue, line 2 "a" Begins]

@@ -35,7 +35,7 @@ module Behavior.Internal.Mock.Moment
   ) where
 
 import Data.List (intercalate)
-import Data.Maybe (fromMaybe, listToMaybe)
+import Data.Maybe (fromMaybe, listToMaybe, mapMaybe)
 
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Runtime (Seconds)
@@ -308,9 +308,9 @@ rangesFrom begins ends rows =
 -- @since 0.1.0.0
 heldFor :: Interval -> Seconds -> Interval
 heldFor s seconds =
-  s
+  checked "heldFor" seconds `seq` s
     { intervalWords = intervalWords s ++ " for over " ++ inSeconds seconds
-    , intervalRanges = \rows -> [range | checked "heldFor" seconds, Just range <- map (later rows) (intervalRanges s rows)]
+    , intervalRanges = \rows -> mapMaybe (later rows) (intervalRanges s rows)
     }
  where
   later rows range
@@ -342,10 +342,10 @@ infixl 9 `heldFor`
 -- @since 0.1.0.0
 shortlyAfter :: Seconds -> Moment -> Interval
 shortlyAfter seconds m =
-  Interval
+  checked "shortlyAfter" seconds `seq` Interval
     { intervalWords = "within " ++ inSeconds seconds ++ " after " ++ momentWords m
     , intervalNames = momentNames m
-    , intervalRanges = \rows -> [range rows row | checked "shortlyAfter" seconds, row <- occurrences m rows]
+    , intervalRanges = \rows -> [range rows row | row <- occurrences m rows]
     }
  where
   range rows row@(_, entry) =
@@ -362,5 +362,7 @@ tolerance :: Seconds
 tolerance = 0.000001
 
 -- | Rejects a number that is not zero or more.
-checked :: String -> Seconds -> Bool
-checked name seconds = seconds >= 0 || errorWithoutStackTrace (name ++ ": zero or more seconds, not " ++ show seconds)
+checked :: String -> Seconds -> ()
+checked name seconds
+  | seconds >= 0 = ()
+  | otherwise = errorWithoutStackTrace (name ++ ": zero or more seconds, not " ++ show seconds)
