@@ -1,12 +1,12 @@
 {-# OPTIONS_GHC -Wno-unused-imports #-}
 
 -- |
--- The names that a program has of its own, beside open imports of all public modules: that this module compiles is the
--- test. A public module that took one of these words would make each use of it here an ambiguous one, which is an error.
--- ("Behavior.Signal" is imported qualified.)
+-- The names that a program has of its own, beside open imports of all public modules: that this module compiles is
+-- the test. A public module that took one of these words would make each use of it here an ambiguous one, which is
+-- an error. ("Behavior.Signal" is imported qualified.)
 --
--- These ordinary words are taken: they are the language and the words of its tests, so a program that imports the module
--- openly has to avoid them, or to hide them.
+-- These ordinary words are taken: they are the language and the words of its tests, so a program that imports the
+-- module openly has to avoid them, or to hide them.
 --
 -- * "Behavior": attempt, both, failed, fallback, monitor, parallel, sleep
 -- * "Behavior.Message": dropped, receive, unhandled

@@ -15,5 +15,6 @@ main :: IO ()
 main = do
   arguments <- getArgs
   case arguments of
-    n : others | [(number, "")] <- reads n -> withArgs others . hspec $ specWith (Effort 1000 2000 number 200 20000 10000 60)
+    n : others | [(number, "")] <- reads n ->
+      withArgs others . hspec $ specWith (Effort 1000 2000 number 200 20000 10000 60)
     _ -> die "reality: the first argument is the seed of the random programs, for example 7"

@@ -103,9 +103,15 @@ rareWorlds =
   , -- Child and body fault at the same time.
     alone (Scoped (Fork (act 1 "a" Faults StopsAtOnce) `Then` act 1 "b" Faults StopsAtOnce))
   , -- Two children are forked at the same time, and fail at the same time.
-    alone (Scoped (Both (Fork (act 1 "a" Fails StopsAtOnce)) (Fork (act 1 "b" Fails StopsAtOnce)) `Then` WaitUntil (Watched "p")))
+    alone . Scoped $
+      Both (Fork (act 1 "a" Fails StopsAtOnce)) (Fork (act 1 "b" Fails StopsAtOnce)) `Then` WaitUntil (Watched "p")
   , -- The shared sensor has failed, and the body reads it before it receives its stop request.
-    (alone (WithShared (Polled 1 (act 9 "s" Fails (EndsAfter 0 Fails))) (uninterruptible 2 "a" `Then` (WaitUntil Shared `Else` act 1 "b" Fails StopsAtOnce))))
+    ( alone
+        ( WithShared
+            (Polled 1 (act 9 "s" Fails (EndsAfter 0 Fails)))
+            (uninterruptible 2 "a" `Then` (WaitUntil Shared `Else` act 1 "b" Fails StopsAtOnce))
+        )
+    )
       { cancelAt = 1
       }
   , -- The shared sensor faults before the body does; the body's fault still comes first.
@@ -114,7 +120,13 @@ rareWorlds =
       , caller = PlainThread Asynchronous 9
       }
   , -- The hysteresis was high while its value did not matter to the operator.
-    (alone (RSelect (And (Hysteresis False 0 2 (Watched "p")) (Watched "q")) (act 1 "l" Fails StopsAtOnce) (act 9 "r" Fails StopsAtOnce)))
+    ( alone
+        ( RSelect
+            (And (Hysteresis False 0 2 (Watched "p")) (Watched "q"))
+            (act 1 "l" Fails StopsAtOnce)
+            (act 9 "r" Fails StopsAtOnce)
+        )
+    )
       { changes = [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "q" (At 1)]
       }
   , -- A throttled change is reverted just when it may be taken.
@@ -131,19 +143,40 @@ rareWorlds =
     alone (WaitUntil (StaleAfter 2 (Polled 3 (act 2 "s" (Succeeds 1) StopsAtOnce))))
   , -- Branch and sensor fault together; the sensor's fault comes first, whichever thread is
     -- older.
-    alone (RSelect (Polled 1 (act 1 "s" (Succeeds 1) (EndsAfter 0 Faults))) (act 1 "l" Faults StopsAtOnce) (act 1 "r" Fails StopsAtOnce))
+    alone $
+      RSelect
+        (Polled 1 (act 1 "s" (Succeeds 1) (EndsAfter 0 Faults)))
+        (act 1 "l" Faults StopsAtOnce)
+        (act 1 "r" Fails StopsAtOnce)
   , -- The child's result is published just when the timeout expires.
     alone (Timeout 2 (Scoped (Await (act 2 "a" (Succeeds 1) StopsAtOnce) (act 1 "b" (Succeeds 2) StopsAtOnce))))
   , -- The child fails, and the body that awaits it continues for a moment.
-    alone (Scoped (Await (act 1 "a" Fails StopsAtOnce) (act 1 "b" Fails StopsAtOnce `Else` act 0 "c" Fails StopsAtOnce) `Else` act 1 "d" Fails StopsAtOnce))
+    alone . Scoped $
+      Await
+        (act 1 "a" Fails StopsAtOnce)
+        (act 1 "b" Fails StopsAtOnce `Else` act 0 "c" Fails StopsAtOnce)
+        `Else` act 1 "d" Fails StopsAtOnce
   , -- The child's stop is requested by its handle just when it ends.
-    alone (Scoped (StopChild (act 1 "a" (Succeeds 1) StopsAtOnce) (act 1 "b" (Succeeds 2) StopsAtOnce) `Else` act 1 "c" (Succeeds 3) StopsAtOnce))
+    alone . Scoped $
+      StopChild (act 1 "a" (Succeeds 1) StopsAtOnce) (act 1 "b" (Succeeds 2) StopsAtOnce)
+        `Else` act 1 "c" (Succeeds 3) StopsAtOnce
   , -- The child fails in its cleanup.
-    alone (Scoped (StopChild (act 9 "a" Fails (EndsAfter 1 Fails)) (act 1 "b" (Succeeds 2) StopsAtOnce) `Else` act 1 "c" (Succeeds 3) StopsAtOnce))
+    alone . Scoped $
+      StopChild (act 9 "a" Fails (EndsAfter 1 Fails)) (act 1 "b" (Succeeds 2) StopsAtOnce)
+        `Else` act 1 "c" (Succeeds 3) StopsAtOnce
   , -- The child forks just when the body returns.
-    alone (Scoped (Fork (uninterruptible 1 "a" `Then` (Fork (act 1 "b" Fails StopsAtOnce) `Else` act 1 "c" Fails StopsAtOnce)) `Then` act 1 "d" (Succeeds 1) StopsAtOnce))
+    alone . Scoped $
+      Fork
+        (uninterruptible 1 "a" `Then` (Fork (act 1 "b" Fails StopsAtOnce) `Else` act 1 "c" Fails StopsAtOnce))
+        `Then` act 1 "d" (Succeeds 1) StopsAtOnce
   , -- The scope receives a stop request just after it has started a child.
-    (alone (Scoped (act 1 "a" (Succeeds 1) StopsAtOnce `Then` (Fork (act 1 "b" Fails StopsAtOnce) `Else` act 1 "c" Fails StopsAtOnce))))
+    ( alone
+        ( Scoped
+            ( act 1 "a" (Succeeds 1) StopsAtOnce
+                `Then` (Fork (act 1 "b" Fails StopsAtOnce) `Else` act 1 "c" Fails StopsAtOnce)
+            )
+        )
+    )
       { cancelAt = 1
       , caller = PlainThread Asynchronous 9
       }
@@ -152,7 +185,11 @@ rareWorlds =
       { cancelAt = 1
       , caller = PlainThread Asynchronous 1
       }
-  , (alone (uninterruptible 2 "a" `Then` (act 9 "b" Fails (EndsAfter 0 (Succeeds 1)) `Then` act 1 "c" Fails StopsAtOnce)))
+  , ( alone
+        ( uninterruptible 2 "a"
+            `Then` (act 9 "b" Fails (EndsAfter 0 (Succeeds 1)) `Then` act 1 "c" Fails StopsAtOnce)
+        )
+    )
       { cancelAt = 1
       , caller = PlainThread Asynchronous 0
       }
@@ -221,7 +258,9 @@ compared world = case paths 500 whatIsDone world of
   asDeadlock = \case
     Unknown _ -> Deadlock
     other -> other
-  sampled = (\found -> (Set.fromList found, False)) <$> traverse (fmap comparable . (`observed` world) . Seeded) [1 .. 2000]
+  sampled =
+    (\found -> (Set.fromList found, False))
+      <$> traverse (fmap comparable . (`observed` world) . Seeded) [1 .. 2000]
   go _ _ [] = pure Undecided
   go allowed seen (search : others) = do
     (found, complete) <- search
@@ -244,7 +283,8 @@ relation = do
       (act "a" 1 Faults `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 1 (Faulted "a")]
     it "throw the last failure of several attempts" $ do
       Attempt 2 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 3 (Failed "a")]
-      Attempt 3 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 6 (Succeeded (Number 7))]
+      Attempt 3 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)])
+        `endsIn` [Gave 6 (Succeeded (Number 7))]
       Attempt 0 (act "a" 1 (Succeeds 7)) `endsIn` [Gave 0 (Failed noAlternative)]
       FallbackOver [] `endsIn` [Gave 0 (Failed noAlternative)]
 
@@ -257,28 +297,42 @@ relation = do
       FirstOf [act "a" 1 Fails, stoppedBy (EndsAfter 3 Faults) "b", stoppedBy (EndsAfter 1 Faults) "c"]
         `endsIn` [Gave 4 (Faulted (cleanupOf "b"))]
     it "wait for all branches, or for the first that fails" $ do
-      AllOf [act "a" 2 (Succeeds 1), act "b" 1 (Succeeds 2)] `endsIn` [Gave 2 (Succeeded (Several [Number 1, Number 2]))]
+      AllOf [act "a" 2 (Succeeds 1), act "b" 1 (Succeeds 2)]
+        `endsIn` [Gave 2 (Succeeded (Several [Number 1, Number 2]))]
       AllOf [act "a" 2 (Succeeds 1), act "b" 1 Fails] `endsIn` [Gave 1 (Failed "b")]
       Both (act "a" 2 Fails) (stoppedBy (StopsAfter 3) "b") `endsIn` [Gave 5 (Failed "a")]
     it "decide as soon as enough have succeeded, or too few are left, and then run what is chosen" $ do
-      let of3 m = Decide (AtLeast m) [act "a" 3 (Succeeds 1), act "b" 1 Fails, stoppedBy (StopsAfter 2) "c"] (act "d" 1 (Succeeds 7))
+      let of3 m =
+            Decide
+              (AtLeast m)
+              [act "a" 3 (Succeeds 1), act "b" 1 Fails, stoppedBy (StopsAfter 2) "c"]
+              (act "d" 1 (Succeeds 7))
       of3 0 `endsIn` [Gave 1 (Succeeded (Number 7))]
       of3 1 `endsIn` [Gave 6 (Succeeded (Number 7))]
       of3 3 `endsIn` [Gave 3 (Failed tooFew)]
-      Decide NoChoice [act "a" 3 (Succeeds 1), act "b" 1 Fails] (act "d" 1 (Succeeds 7)) `endsIn` [Gave 3 (Faulted noneChosen)]
+      Decide NoChoice [act "a" 3 (Succeeds 1), act "b" 1 Fails] (act "d" 1 (Succeeds 7))
+        `endsIn` [Gave 3 (Faulted noneChosen)]
     it "stop the children when the body ends, and body and children when a child fails" $ do
-      Scoped (Fork (stoppedBy (StopsAfter 2) "a") `Then` act "b" 1 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
+      Scoped (Fork (stoppedBy (StopsAfter 2) "a") `Then` act "b" 1 (Succeeds 7))
+        `endsIn` [Gave 3 (Succeeded (Number 7))]
       Scoped (Fork (act "a" 1 Fails) `Then` stoppedBy (StopsAfter 2) "b") `endsIn` [Gave 3 (Failed "a")]
     it "wait for a child's result, and throw its failure" $ do
       Scoped (Await (act "a" 3 (Succeeds 7)) (act "b" 1 (Succeeds 1))) `endsIn` [Gave 3 (Succeeded (Number 7))]
-      Scoped (Await (act "a" 3 Fails) (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 1)) `endsIn` [Gave 3 (Failed "a")]
+      Scoped (Await (act "a" 3 Fails) (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 1))
+        `endsIn` [Gave 3 (Failed "a")]
 
     it "stop a child by its handle, which is a failure where the child is awaited, and not of the scope" $ do
-      Scoped (StopChild (stoppedBy (StopsAfter 2) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7)) `endsIn` [Gave 4 (Succeeded (Number 7))]
-      Scoped (StopChild (stoppedBy (EndsAfter 2 (Succeeds 7)) "a") (act "b" 1 (Succeeds 1))) `endsIn` [Gave 3 (Succeeded (Number 7))]
-      Scoped (StopChild (stoppedBy (EndsAfter 2 Faults) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7)) `endsIn` [Gave 3 (Faulted (cleanupOf "a"))]
+      Scoped (StopChild (stoppedBy (StopsAfter 2) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7))
+        `endsIn` [Gave 4 (Succeeded (Number 7))]
+      Scoped (StopChild (stoppedBy (EndsAfter 2 (Succeeds 7)) "a") (act "b" 1 (Succeeds 1)))
+        `endsIn` [Gave 3 (Succeeded (Number 7))]
+      Scoped (StopChild (stoppedBy (EndsAfter 2 Faults) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7))
+        `endsIn` [Gave 3 (Faulted (cleanupOf "a"))]
     it "let a fork fail while the scope stops its branches" $
-      Scoped (Fork (Do "a" [(script 2 (Succeeds 0)) {masking = Uninterruptible}] `Then` Fork (act "b" 1 Faults)) `Then` act "c" 1 (Succeeds 7))
+      Scoped
+        ( Fork (Do "a" [(script 2 (Succeeds 0)) {masking = Uninterruptible}] `Then` Fork (act "b" 1 Faults))
+            `Then` act "c" 1 (Succeeds 7)
+        )
         `endsIn` [Gave 2 (Succeeded (Number 7))]
 
   describe "Stopping" $ do
@@ -294,16 +348,16 @@ relation = do
         `endsIn` [Gave 4 (Failed (timedOut 1))]
 
     it "throws the fault of a cleanup together with another thread's cancellation" $ do
-      (with [] (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))) {cancelAt = 2, caller = PlainThread Asynchronous 1}
+      cancelledTwice (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))
         `endsWith` [Gave 5 (Stopped (Just (cleanupOf "b")))]
     it "can be requested twice by another thread; the second request is received after a cleanup" $ do
-      (with [] (stoppedBy (EndsAfter 0 (Succeeds 7)) "a" `Then` stoppedBy StopsAtOnce "b")) {cancelAt = 2, caller = PlainThread Asynchronous 1}
+      cancelledTwice (stoppedBy (EndsAfter 0 (Succeeds 7)) "a" `Then` stoppedBy StopsAtOnce "b")
         `endsWith` [Gave 3 (Stopped Nothing)]
-      (with [] (stoppedBy (EndsAfter 2 (Succeeds 7)) "a")) {cancelAt = 2, caller = PlainThread Asynchronous 1}
+      cancelledTwice (stoppedBy (EndsAfter 2 (Succeeds 7)) "a")
         `endsWith` [Gave 4 (Stopped Nothing)]
     it "that another thread requests twice interrupts the caller's cleanup, but not a branch's" $ do
-      (with [] (stoppedBy (CleansUpInterruptibly 5) "a")) {cancelAt = 2, caller = PlainThread Asynchronous 1} `endsWith` [Gave 3 (Stopped Nothing)]
-      (with [] (Timeout 50 (stoppedBy (CleansUpInterruptibly 5) "a"))) {cancelAt = 2, caller = PlainThread Asynchronous 1}
+      cancelledTwice (stoppedBy (CleansUpInterruptibly 5) "a") `endsWith` [Gave 3 (Stopped Nothing)]
+      cancelledTwice (Timeout 50 (stoppedBy (CleansUpInterruptibly 5) "a"))
         `endsWith` [Gave 7 (Stopped Nothing)]
 
   describe "Conditions that change" $ do
@@ -351,7 +405,10 @@ relation = do
     it "with a hysteresis stay high above the lower threshold" $
       with
         [Change 1 "p" (At 2), Change 2 "p" (At 1), Change 3 "p" (At 0)]
-        (WithShared (Hysteresis False 0 2 (Watched "p")) (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7))))
+        ( WithShared
+            (Hysteresis False 0 2 (Watched "p"))
+            (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7)))
+        )
         `endsWith` [Gave 3 (Failed doesNotHold)]
     it "with a debounce ignore a short change" $
       with [Change 1 "p" (At 1), Change 2 "p" (At 0), Change 3 "p" (At 1)] (WaitUntil (Debounce 2 (Watched "p")))
@@ -373,7 +430,18 @@ relation = do
   script n how = Script n how Unmasked StopsAtOnce
   -- An action that takes longer than anything else, and responds to a stop request like that.
   stoppedBy response name = Do name [(script 50 (Succeeds 0)) {onStop = response}]
-  with changes' p = World {conditions = [("p", At 0), ("q", At 0)], changes = changes', cancelAt = 100, program = p, caller = Operator, slippage = 0}
+  with changes' p =
+    World
+      { conditions = [("p", At 0), ("q", At 0)]
+      , changes = changes'
+      , cancelAt = 100
+      , program = p
+      , caller = Operator
+      , slippage = 0
+      }
+  -- Another thread cancels it at 2 and at 3.
+  cancelledTwice p = (with [] p) {cancelAt = 2, caller = PlainThread Asynchronous 1}
   endsIn p = endsWith (with [] p)
   endsWith world ends' = fmap (Set.map end) (paths 10000 whatIsDone world) `shouldBe` Just (Set.fromList ends')
-  hasTimeline world transitions = fmap (Set.map timeline) (paths 10000 whatIsDone world) `shouldBe` Just (Set.singleton transitions)
+  hasTimeline world transitions =
+    fmap (Set.map timeline) (paths 10000 whatIsDone world) `shouldBe` Just (Set.singleton transitions)

@@ -184,8 +184,10 @@ data ThreadEvent = Started Label | Ended Label
 watchingThreads :: (ThreadEvent -> IO ()) -> IO a -> IO a
 watchingThreads f act = do
   here <- myPlace
-  whole <- withReceiver Receiver {firstNumber = 1, needsDetail = True, receiveEvent = traverse_ f . threadEvent} <$> maybe (newTrace (pure 0)) (pure . trace) here
-  mask $ \restore -> withLiveTrace whole (inPlace (Just (maybe (top whole Trace.Top) (\place -> place {trace = whole}) here)) (restore act))
+  let receiver = Receiver {firstNumber = 1, needsDetail = True, receiveEvent = traverse_ f . threadEvent}
+  whole <- withReceiver receiver <$> maybe (newTrace (pure 0)) (pure . trace) here
+  let inside = maybe (top whole Trace.Top) (\place -> place {trace = whole}) here
+  mask $ \restore -> withLiveTrace whole (inPlace (Just inside) (restore act))
  where
   threadEvent = \case
     Trace.Began s | isThread s -> Just (Started (labelOf s))

@@ -177,7 +177,8 @@ onStop how name act =
 -- | Returns once the thread is blocked by another one: until that one has received an
 -- exception, or has ended.
 awaitBlockedByThread :: ThreadId -> IO ()
-awaitBlockedByThread thread = eventually ((`elem` map ThreadBlocked [BlockedOnException, BlockedOnSTM]) <$> threadStatus thread)
+awaitBlockedByThread thread =
+  eventually ((`elem` map ThreadBlocked [BlockedOnException, BlockedOnSTM]) <$> threadStatus thread)
 
 -- | Whether the gate is open.
 opened :: Gate -> IO Bool

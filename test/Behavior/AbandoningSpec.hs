@@ -31,12 +31,14 @@ spec = guarded . describe "abandoning" $ do
 
   describe "A behaviour whose stop takes two seconds" $ do
     it "is awaited if it has three; a fault of its stop is not lost" $
-      for_ [(pure (), FailedWith "TimedOut 1.0"), (throwIO (Fault "arm"), FaultedWith (show (Fault "arm")))] $ \(how, expected) -> do
-        end <- newIORef Nothing
-        run <- simulate $ ending (timeout 1 (abandoning 3 (hang `onException` uninterruptibleMask_ (sleep 2 >> how)))) >>= writeIORef end . Just
-        finished run `shouldBe` 3
-        abandonedCount `shouldReturn` 0
-        readIORef end `shouldReturn` Just (expected :: Ending ())
+      for_ [(pure (), FailedWith "TimedOut 1.0"), (throwIO (Fault "arm"), FaultedWith (show (Fault "arm")))] $
+        \(how, expected) -> do
+          end <- newIORef Nothing
+          run <- simulate $ ending (timeout 1 (abandoning 3 (hang `onException` uninterruptibleMask_ (sleep 2 >> how))))
+            >>= writeIORef end . Just
+          finished run `shouldBe` 3
+          abandonedCount `shouldReturn` 0
+          readIORef end `shouldReturn` Just (expected :: Ending ())
 
     it "is abandoned if it has one; both its abandonment and its end are reported" $ do
       counts <- newIORef []
@@ -50,7 +52,8 @@ spec = guarded . describe "abandoning" $ do
         counted
       readIORef counts `shouldReturn` [(3.5, 0), (2.5, 1), (2, 1)]
       [(stepTime step, text) | step@Step {stepKind = Note text} <- steps run, "abandoning" `isInfixOf` text]
-        `shouldBe` [ (2, "abandoning: a behaviour that has not ended 1.0 s after its stop was requested is abandoned, and still runs")
+        `shouldBe` [ (2, "abandoning: a behaviour that has not ended 1.0 s after its stop was requested \
+                         \is abandoned, and still runs")
                    , (3, "abandoning: a behaviour that was abandoned has ended with " ++ show (Fault "arm"))
                    ]
 
@@ -70,14 +73,16 @@ spec = guarded . describe "abandoning" $ do
     mayEnd <- newGate
     reporting (note reports . show) $ do
       let stuck = uninterruptibleMask_ (open entered >> pass mayEnd >> throwIO (Fault "camera"))
-      cancelling (abandoning 0.001 stuck) (pass entered) `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
+      cancelling (abandoning 0.001 stuck) (pass entered)
+        `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
       abandonedCount `shouldReturn` 1
       eventually ((== 1) . length <$> notes reports)
       open mayEnd
       eventually ((== 0) <$> abandonedCount)
       eventually ((== 2) . length <$> notes reports)
     notes reports
-      `shouldReturn` [ "abandoning: a behaviour that has not ended 0.001 s after its stop was requested is abandoned, and still runs"
+      `shouldReturn` [ "abandoning: a behaviour that has not ended 0.001 s after its stop was requested \
+                       \is abandoned, and still runs"
                      , "abandoning: a behaviour that was abandoned has ended with " ++ show (Fault "camera")
                      ]
 
@@ -100,16 +105,20 @@ spec = guarded . describe "abandoning" $ do
     calls <- newLog
     entered <- newGate
     reporting (note calls . show) $ do
-      _ <- cancelling (abandoning 0.001 (uninterruptibleMask_ (open entered >> (newEmptyMVar >>= takeMVar :: IO ())))) (pass entered)
+      _ <- cancelling
+        (abandoning 0.001 (uninterruptibleMask_ (open entered >> (newEmptyMVar >>= takeMVar :: IO ()))))
+        (pass entered)
       eventually (performMajorGC >> (== 2) . length <$> notes calls)
-    last <$> notes calls `shouldReturn` "abandoning: a behaviour that was abandoned has ended with " ++ show BlockedIndefinitelyOnMVar
+    last <$> notes calls
+      `shouldReturn` "abandoning: a behaviour that was abandoned has ended with " ++ show BlockedIndefinitelyOnMVar
 
   it "is not interrupted while it waits: a second cancellation stays pending" $ do
     entered <- newGate
     cleaning <- newGate
     mayEnd <- newGate
     entries <- newLog
-    let slow = (open entered >> hang) `onException` uninterruptibleMask_ (open cleaning >> pass mayEnd >> note entries "ended")
+    let slow = (open entered >> hang)
+          `onException` uninterruptibleMask_ (open cleaning >> pass mayEnd >> note entries "ended")
     end <- withThread (abandoning 3600 slow) $ \caller -> do
       pass entered
       throwing (asyncThreadId caller) (Cancel "first")

@@ -37,7 +37,8 @@ spec = guarded . describe "agreeing" $ do
       , (1, "?a", 2, Right "a")
       ]
       $ \(m, answers, seconds, end) -> do
-        found <- timed (agreeing m (==) [sleep n >> if answer == '?' then failed else pure answer | (n, answer) <- zip [1 ..] answers])
+        found <- timed . agreeing m (==) $
+          [sleep n >> if answer == '?' then failed else pure answer | (n, answer) <- zip [1 ..] answers]
         (m, answers, found) `shouldBe` (m, answers, (seconds, end))
 
   prop "is its definition, with any relation" $ \relation ->
@@ -55,13 +56,16 @@ spec = guarded . describe "agreeing" $ do
 
   it "throws a fault of a behaviour, and of the function" $ do
     ending (agreeing 2 (==) [pure 'a', throwIO (Fault "lidar"), hang]) `shouldReturn` FaultedWith (show (Fault "lidar"))
-    ending (agreeing 2 (\_ _ -> errorWithoutStackTrace "no scale") (map pure "ab")) `shouldReturn` FaultedWith "no scale"
+    ending (agreeing 2 (\_ _ -> errorWithoutStackTrace "no scale") (map pure "ab"))
+      `shouldReturn` FaultedWith "no scale"
 
   it "of 200 sensors that agree in groups" $
-    timed (agreeing 11 (==) [pure (n `mod` 20) | n <- [1 .. 200 :: Int]]) `shouldReturn` (0, Left "FailedBecause \"no 11 of 200 agree\"")
+    timed (agreeing 11 (==) [pure (n `mod` 20) | n <- [1 .. 200 :: Int]])
+      `shouldReturn` (0, Left "FailedBecause \"no 11 of 200 agree\"")
 
-  it "gives results that agree under all schedules of sensors that answer at the same time" . void . explore (exhaustively 1) $ \simulate' ->
-    (simulate' (agreeing 2 (==) [pure 'a', pure 'b', pure 'a']) >>= returned) `shouldReturn` "aa"
+  it "gives results that agree under all schedules of sensors that answer at the same time"
+    . void . explore (exhaustively 1) $ \simulate' ->
+      (simulate' (agreeing 2 (==) [pure 'a', pure 'b', pure 'a']) >>= returned) `shouldReturn` "aa"
 
 -- | What 'agreeing' gives, and when, if each behaviour answers a second after the one before.
 defined :: Int -> (a -> a -> Bool) -> [a] -> (Seconds, Either String [a])
@@ -82,7 +86,8 @@ defined m agree values = head (concatMap at [0 .. n])
 
 -- | In a simulation: when it ended, and what it returned or how it failed.
 timed :: Behavior a -> IO (Seconds, Either String a)
-timed act = simulate (((Right <$> act) `fallbackWith` (pure . Left . show)) >>= \end -> (\t -> (t, end)) <$> now) >>= returned
+timed act = simulate (((Right <$> act) `fallbackWith` (pure . Left . show)) >>= \end -> (\t -> (t, end)) <$> now)
+  >>= returned
 
 returned :: Run a -> IO a
 returned run = case outcome run of

@@ -105,7 +105,8 @@ goingWrong = do
     notes entries `shouldReturn` ["branch is over", "reading is over", "operator is over"]
 
   for_ ["reading", "branch"] $ \uninterruptible ->
-    it ("is stopped together with the branch: both stop requests are made at once, though the " ++ uninterruptible ++ " is uninterruptible") $ do
+    it ("is stopped together with the branch: both stop requests are made at once, though the "
+        ++ uninterruptible ++ " is uninterruptible") $ do
       started <- newGate
       readingEntered <- newGate
       received <- newGate

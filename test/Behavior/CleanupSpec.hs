@@ -35,11 +35,13 @@ spec = guarded . describe "cleanupWithin" $ do
   it "throws the behaviour's own failure or fault, also of its stop" $ do
     ending (cleanupWithin 3600 failed) `shouldReturn` (FailedWith "Failed" :: Ending (Maybe ()))
     ending (cleanupWithin 3600 (timeout 0 hang)) `shouldReturn` (FailedWith "TimedOut 0.0" :: Ending (Maybe ()))
-    ending (cleanupWithin 0.001 (hang `onException` throwIO (Fault "arm"))) `shouldReturn` (FaultedWith (show (Fault "arm")) :: Ending (Maybe ()))
+    ending (cleanupWithin 0.001 (hang `onException` throwIO (Fault "arm")))
+      `shouldReturn` (FaultedWith (show (Fault "arm")) :: Ending (Maybe ()))
 
   it "runs the behaviour unmasked, whatever the caller's state, and leaves that as it was" $
     for_ [id, mask_, uninterruptibleMask_] $ \inState -> do
-      (earlier, inside, later) <- inState ((,,) <$> getMaskingState <*> cleanupWithin 3600 getMaskingState <*> getMaskingState)
+      (earlier, inside, later) <-
+        inState ((,,) <$> getMaskingState <*> cleanupWithin 3600 getMaskingState <*> getMaskingState)
       inside `shouldBe` Just Unmasked
       later `shouldBe` earlier
 
@@ -70,7 +72,8 @@ spec = guarded . describe "cleanupWithin" $ do
       end `shouldBe` (CancelledBy (show (Cancel "first")) :: Ending ())
 
     it "when its time is up, the cancellation goes on too, and the operator's outcome stays" $
-      ending (timeout 0.001 (hang `onException` cleanupWithin 0.001 hang)) `shouldReturn` (FailedWith "TimedOut 0.001" :: Ending ())
+      ending (timeout 0.001 (hang `onException` cleanupWithin 0.001 hang))
+        `shouldReturn` (FailedWith "TimedOut 0.001" :: Ending ())
 
     it "parks the arm under all schedules in which it is cancelled twice; a plain handler does not" $ do
       notParked (void . cleanupWithin 10) `shouldReturn` 0

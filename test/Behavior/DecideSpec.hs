@@ -42,7 +42,8 @@ asking = do
   it "after each end, with all ends so far, by position" $ do
     (asked, remember) <- recorder
     let behaviors = [sleep 3 >> pure 'a', sleep 1 >> failWith "b", sleep 2 >> pure 'c']
-    run <- simulate (decide (\ends -> remember ends (if length (catMaybes ends) == 3 then Just (pure "all") else Nothing)) behaviors)
+    let allThree ends = if length (catMaybes ends) == 3 then Just (pure "all") else Nothing
+    run <- simulate (decide (\ends -> remember ends (allThree ends)) behaviors)
     returned run "all"
     asked
       `shouldReturn` [ [Nothing, Nothing, Nothing]
@@ -90,8 +91,10 @@ chosen = do
 
   it "and gives its result, failure or fault" $ do
     decide (whenOneEnds (pure 'x')) [pure ()] `shouldReturn` 'x'
-    ending (decide (whenOneEnds (failWith "chosen")) [pure ()]) `shouldReturn` (FailedWith "FailedBecause \"chosen\"" :: Ending ())
-    ending (decide (whenOneEnds (throwIO (Fault "chosen"))) [pure ()]) `shouldReturn` (FaultedWith (show (Fault "chosen")) :: Ending ())
+    ending (decide (whenOneEnds (failWith "chosen")) [pure ()])
+      `shouldReturn` (FailedWith "FailedBecause \"chosen\"" :: Ending ())
+    ending (decide (whenOneEnds (throwIO (Fault "chosen"))) [pure ()])
+      `shouldReturn` (FaultedWith (show (Fault "chosen")) :: Ending ())
 
   it "but not if the caller is cancelled while the others clean up" $ do
     entries <- newLog
@@ -113,28 +116,35 @@ unchosen = do
     entries <- newLog
     entered <- newGate
     let other = (open entered >> hang) `uninterruptibly` note entries "cleaned up"
-    ending (decide (whenOneEnds (note entries "chosen")) [other, pass entered >> throwIO (Fault "lidar")]) `shouldReturn` FaultedWith (show (Fault "lidar"))
+    ending (decide (whenOneEnds (note entries "chosen")) [other, pass entered >> throwIO (Fault "lidar")])
+      `shouldReturn` FaultedWith (show (Fault "lidar"))
     notes entries `shouldReturn` ["cleaned up"]
 
   it "by the leftmost of two faults, though the function has chosen" $ do
     entries <- newLog
     entered <- newGate
     let faulty = (open entered >> hang) `onException` throwIO (Fault "cleanup")
-    ending (decide (whenOneEnds (note entries "chosen")) [faulty, pass entered]) `shouldReturn` FaultedWith (show (Fault "cleanup"))
+    ending (decide (whenOneEnds (note entries "chosen")) [faulty, pass entered])
+      `shouldReturn` FaultedWith (show (Fault "cleanup"))
     notes entries `shouldReturn` []
 
   it "by what the function throws, after the cleanups" $
-    for_ [(throw (Fault "function"), FaultedWith (show (Fault "function"))), (throw (FailedBecause "no quorum"), FailedWith "FailedBecause \"no quorum\"")] $ \(bottom, expected) -> do
-      entries <- newLog
-      entered <- newGate
-      let other = (open entered >> hang) `uninterruptibly` note entries "cleaned up"
-          choose ends = if null (catMaybes ends) then Nothing else bottom
-      ending (decide choose [other, pass entered]) `shouldReturn` (expected :: Ending ())
-      notes entries `shouldReturn` ["cleaned up"]
+    for_
+      [ (throw (Fault "function"), FaultedWith (show (Fault "function")))
+      , (throw (FailedBecause "no quorum"), FailedWith "FailedBecause \"no quorum\"")
+      ]
+      $ \(bottom, expected) -> do
+        entries <- newLog
+        entered <- newGate
+        let other = (open entered >> hang) `uninterruptibly` note entries "cleaned up"
+            choose ends = if null (catMaybes ends) then Nothing else bottom
+        ending (decide choose [other, pass entered]) `shouldReturn` (expected :: Ending ())
+        notes entries `shouldReturn` ["cleaned up"]
 
   it "by what the function throws before the start: nothing starts" $ do
     entries <- newLog
-    ending (decide (throw (Fault "function")) [note entries "started"]) `shouldReturn` (FaultedWith (show (Fault "function")) :: Ending ())
+    ending (decide (throw (Fault "function")) [note entries "started"])
+      `shouldReturn` (FaultedWith (show (Fault "function")) :: Ending ())
     notes entries `shouldReturn` []
 
   it "by a fault that names decide, if all have ended and nothing is chosen" $
@@ -155,10 +165,11 @@ unchosen = do
 patterns :: Spec
 patterns = do
   it "firstOf: they have the same ends under all schedules" $
-    for_ [(a, b) | a <- actions, b <- actions, any ((`elem` ["succeeds", "fails", "faults"]) . fst) [a, b]] $ \(a, b) -> do
-      (one, _) <- allEnds (firstOf [snd a, snd b])
-      (other, _) <- allEnds (decide firstEnd [snd a, snd b])
-      (fst a, fst b, other) `shouldBe` (fst a, fst b, one)
+    for_ [(a, b) | a <- actions, b <- actions, any ((`elem` ["succeeds", "fails", "faults"]) . fst) [a, b]] $
+      \(a, b) -> do
+        (one, _) <- allEnds (firstOf [snd a, snd b])
+        (other, _) <- allEnds (decide firstEnd [snd a, snd b])
+        (fst a, fst b, other) `shouldBe` (fst a, fst b, one)
 
   it "two of three, with at most twice the schedules of the first of three" $ do
     (_, least) <- allEnds (void (firstOf (replicate 3 (pure ()))))

@@ -164,7 +164,8 @@ stale = do
       minute (Signal.waitUntil (Signal.staleAfter 2 (made hanging))) `shouldReturn` (tooLong, 7)
 
   for_ [(3, 7), (6, 7), (8, 8)] $ \(used, failedAt) ->
-    it ("fails on a shared signal when a reading hangs from second 5 on, and it is used from second " ++ show used ++ " on") $
+    it ("fails on a shared signal when a reading hangs from second 5 on, and it is used from second "
+        ++ show used ++ " on") $
       minute (Signal.withShared hanging (\s -> sleep used >> Signal.waitUntil (Signal.staleAfter 2 s)))
         `shouldReturn` (tooLong, failedAt)
  where

@@ -183,7 +183,8 @@ debounce = do
 
   it "measures a change from its last occurrence" $ do
     level <- newTVarIO (0 :: Int)
-    let flicker = for_ [(1, 1), (0.5, 0), (0.25, 1)] $ \(pause, value) -> sleep pause >> atomically (writeTVar level value)
+    let flicker =
+          for_ [(1, 1), (0.5, 0), (0.25, 1)] $ \(pause, value) -> sleep pause >> atomically (writeTVar level value)
     run <- simulate (Signal.waitUntil (Signal.debounce 1 ((== 1) <$> watchedVar level)) ||| (flicker >> hang))
     finished run `shouldBe` 2.75
 

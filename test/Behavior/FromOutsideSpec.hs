@@ -51,7 +51,9 @@ operators =
   , ("monitor", Signal.monitor (pure False) (pure ()))
   , ("monitor (its recovery)", \act -> Signal.monitor (pure True) (void act) (pure ""))
   , ("onMessage", \act -> withInbox 1 silent (\inbox -> onMessage inbox (\() -> hang) act))
-  , ("onMessage (its handler)", \act -> withInbox 1 speaking (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure "")))
+  , ( "onMessage (its handler)"
+    , \act -> withInbox 1 speaking (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure ""))
+    )
   , ("rSelect, polled", \act -> rSelect (pure True) act (pure ""))
   , ("monitor, polled", monitor (pure False) (pure ()))
   ]
@@ -143,10 +145,11 @@ stoppedFirst :: (Signal k -> Behavior () -> Behavior ()) -> Signal k -> IO () ->
 stoppedFirst follower signal breakIt expected = do
   entered <- newGate
   entries <- newLog
-  end <- withThread (follower signal ((open entered >> hang) `uninterruptibly` note entries "cleaned up")) $ \caller -> do
-    pass entered
-    breakIt
-    awaitEnd caller
+  end <- withThread (follower signal ((open entered >> hang) `uninterruptibly` note entries "cleaned up")) $
+    \caller -> do
+      pass entered
+      breakIt
+      awaitEnd caller
   end `shouldBe` expected
   notes entries `shouldReturn` ["cleaned up"]
 
@@ -168,13 +171,16 @@ undefinedExceptions = do
       reading <- newGate
       entries <- newLog
       let sensor = Signal.polling 0.001 ((open reading >> hang) `uninterruptibly` note entries "cleaned up")
-      ending (Signal.withShared sensor (\_ -> pass reading >> bottom)) `shouldReturn` FaultedWith (show (Fault "undefined"))
+      ending (Signal.withShared sensor (\_ -> pass reading >> bottom))
+        `shouldReturn` FaultedWith (show (Fault "undefined"))
       notes entries `shouldReturn` ["cleaned up"]
     it ("monitor, " ++ kind ++ ": thrown by the task while it stops, is rethrown after the recovery") $ do
       condition <- newTVarIO False
       entered <- newGate
       entries <- newLog
-      end <- withThread (Signal.monitor (Signal.watching (readTVar condition)) (note entries "recovered") ((open entered >> hang) `onException` bottom)) $ \caller -> do
+      let task = (open entered >> hang) `onException` bottom
+          monitored = Signal.monitor (Signal.watching (readTVar condition)) (note entries "recovered") task
+      end <- withThread monitored $ \caller -> do
         pass entered
         atomically (writeTVar condition True)
         awaitEnd caller

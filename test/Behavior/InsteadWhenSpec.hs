@@ -21,21 +21,25 @@ import Watched
 spec :: Spec
 spec = guarded . describe "insteadWhen" $ do
   prop "with a constant condition is one behaviour or the other" $ \c a b ->
-    sameAs (\entries -> Signal.insteadWhen (pure c) (play entries a) (play entries b)) (\entries -> play entries (if c then a else b))
+    sameAs
+      (\entries -> Signal.insteadWhen (pure c) (play entries a) (play entries b))
+      (\entries -> play entries (if c then a else b))
 
   it "runs the emergency to its end, however the condition changes, and gives its result" $ do
     entries <- newLog
     condition <- newTestCondition False
     entered <- newGate
     release <- newGate
-    let emergency = (open entered >> pass release >> note entries "landed" >> pure "landed") `onException` note entries "interrupted"
-    end <- withThread (Signal.insteadWhen (watched condition) emergency (set condition (Value True) >> hang)) $ \caller -> do
-      pass entered
-      for_ [Value False, Value True, SensorFailure, SensorFault, NoValue, Value False] $ \newState -> do
-        set condition newState
-        stillRunning caller
-      open release
-      awaitEnd caller
+    let emergency = (open entered >> pass release >> note entries "landed" >> pure "landed")
+          `onException` note entries "interrupted"
+    end <- withThread (Signal.insteadWhen (watched condition) emergency (set condition (Value True) >> hang)) $
+      \caller -> do
+        pass entered
+        for_ [Value False, Value True, SensorFailure, SensorFault, NoValue, Value False] $ \newState -> do
+          set condition newState
+          stillRunning caller
+        open release
+        awaitEnd caller
     (,) end <$> notes entries `shouldReturn` (Gave "landed", ["landed"])
 
   it "has no way back: the act does not start again when the emergency has ended" $ do
@@ -55,7 +59,8 @@ spec = guarded . describe "insteadWhen" $ do
 
   it "ends by the emergency's failure or fault" $ do
     ending (Signal.insteadWhen (pure True) failed hang) `shouldReturn` (FailedWith "Failed" :: Ending ())
-    ending (Signal.insteadWhen (pure True) (throwIO (Fault "motor")) hang) `shouldReturn` (FaultedWith (show (Fault "motor")) :: Ending ())
+    ending (Signal.insteadWhen (pure True) (throwIO (Fault "motor")) hang)
+      `shouldReturn` (FaultedWith (show (Fault "motor")) :: Ending ())
 
   describe "A drone that must land when the wind rises, and stay there," $
     for_ [("", pure ()), (", though its camera faults while it is stopped", throwIO camera)] $ \(though, closing) -> do

@@ -32,7 +32,8 @@ rule = do
     sameAs
       (\entries -> withInbox 9 (delivering messages) $ \box -> onMessage box (handler entries b) (play entries a))
       ( \entries -> withInbox 9 (delivering messages) $ \box ->
-          messageRule box (handler entries b) >>= \handling -> Signal.teleoReactive [(pure False, hang), handling, (pure True, play entries a)]
+          messageRule box (handler entries b) >>= \handling ->
+            Signal.teleoReactive [(pure False, hang), handling, (pure True, play entries a)]
       )
 
   it "ends the rules with the handler's failure, fault, or cancellation; then the message waits again" $
@@ -49,7 +50,9 @@ rule = do
     withInbox 9 (delivering "a") $ \box -> do
       handling <- messageRule box (\_ -> retry <$ open entered)
       withThread (pass entered >> atomically (writeTVar danger True)) . const $
-        Signal.teleoReactive [(Signal.watching (readTVar danger), atomically (receive box)), handling, (pure True, pure 'p')] `shouldReturn` 'a'
+        Signal.teleoReactive
+          [(Signal.watching (readTVar danger), atomically (receive box)), handling, (pure True, pure 'p')]
+          `shouldReturn` 'a'
 
   it "drops the message that a rule before it interrupts, if newer ones have filled the inbox" $ do
     callback <- newIORef (\_ -> pure ())
@@ -62,7 +65,8 @@ rule = do
             | otherwise = pure (modifyTVar' done (m :))
           flee = atomically (writeTVar danger False) >> hang
       handling <- messageRule box handle
-      Signal.teleoReactive [(Signal.watching (readTVar danger), flee), handling, (pure True, atomically ((,,) <$> readTVar done <*> dropped box <*> unhandled box))]
+      let counted = atomically ((,,) <$> readTVar done <*> dropped box <*> unhandled box)
+      Signal.teleoReactive [(Signal.watching (readTVar danger), flee), handling, (pure True, counted)]
         `shouldReturn` ("b", 1, 0)
 
   it "is interrupted by a rule before it also if the handler completes nevertheless" $ do
@@ -72,7 +76,8 @@ rule = do
       atomically (writeTVar done "" >> writeTVar danger False)
       _ <- simulate' . withInbox 9 (delivering "ab") $ \box -> do
         handling <- messageRule box (\m -> modifyTVar' done (m :) <$ (try (sleep 9) :: IO (Either SomeException ())))
-        Signal.teleoReactive [(Signal.watching (readTVar danger), sleep 1), handling] `both` (sleep 1 >> atomically (writeTVar danger True))
+        Signal.teleoReactive [(Signal.watching (readTVar danger), sleep 1), handling]
+          `both` (sleep 1 >> atomically (writeTVar danger True))
       readTVarIO done `shouldReturn` "a"
     pure ()
 
@@ -102,7 +107,8 @@ rule = do
   it "lets several robots share an inbox, on real threads: each message is handled by one" $ do
     done <- newTVarIO []
     withInbox 1000 (delivering [1 .. 300 :: Int]) $ \box -> do
-      let robot = messageRule box (\m -> yield >> pure (modifyTVar' done (m :))) >>= \handling -> Signal.teleoReactive [handling, (pure True, hang)]
+      let robot = messageRule box (\m -> yield >> pure (modifyTVar' done (m :))) >>= \handling ->
+            Signal.teleoReactive [handling, (pure True, hang)]
       (robot `both` robot) ||| atomically (readTVar done >>= check . (== 300) . length)
     sort <$> readTVarIO done `shouldReturn` [1 .. 300]
  where
@@ -116,15 +122,22 @@ type Way = Inbox Int -> (Int -> Behavior (STM ())) -> Behavior (Signal Bool, Beh
 drone :: Spec
 drone = do
   it "handles each of three once, under random schedules" $ wrong (randomly 300) three messageRule `shouldReturn` []
-  it "handles one once, under all schedules with one pre-emption" $ wrong (exhaustively 1) [[Message 1, Danger]] messageRule `shouldReturn` []
-  it "does so too with the condition that a message is unhandled, if it alone takes them" $ wrong (randomly 300) three conditioned `shouldReturn` []
-  it "loses some if its rule receives them" $ wrong (randomly 100) three received >>= (`shouldContain` ["1 was committed 0 times"])
-  it "handles some twice if they are taken when its handler has returned" $ wrong (randomly 300) three takenAtReturn >>= (`shouldContain` ["1 was committed 2 times"])
+  it "handles one once, under all schedules with one pre-emption" $
+    wrong (exhaustively 1) [[Message 1, Danger]] messageRule `shouldReturn` []
+  it "does so too with the condition that a message is unhandled, if it alone takes them" $
+    wrong (randomly 300) three conditioned `shouldReturn` []
+  it "loses some if its rule receives them" $
+    wrong (randomly 100) three received >>= (`shouldContain` ["1 was committed 0 times"])
+  it "handles some twice if they are taken when its handler has returned" $
+    wrong (randomly 300) three takenAtReturn >>= (`shouldContain` ["1 was committed 2 times"])
 
   it "ends after one message if its rule returns" $ do
     begun <- newIORef (0 :: Int)
     _ <- simulate . withInbox 9 (delivering [1, 2 :: Int]) $ \box ->
-      Signal.teleoReactive [(someUnhandled box, handleNext box (\_ -> modifyIORef' begun (+ 1) >> sleep 1 >> pure (pure ()))), (pure True, sleep 5)]
+      Signal.teleoReactive
+        [ (someUnhandled box, handleNext box (\_ -> modifyIORef' begun (+ 1) >> sleep 1 >> pure (pure ())))
+        , (pure True, sleep 5)
+        ]
     readIORef begun `shouldReturn` 1
 
   it "on real threads: handles each of 300 once, in order, and begins none again without an interruption" $ do
@@ -135,8 +148,13 @@ drone = do
     withInbox 1000 (delivering [1 .. 300 :: Int]) $ \box -> do
       handling <- messageRule box $ \m -> modifyIORef' begun (+ 1) >> yield >> pure (modifyTVar' done (m :))
       let flee = forever (atomically (readTVar danger >>= check) >> yield >> atomically (writeTVar danger False))
-          alarms = forever (replicateM_ 3 yield >> modifyIORef' dangers (+ 1) >> atomically (writeTVar danger True) >> atomically (readTVar danger >>= check . not))
-      alarms ||| Signal.teleoReactive [(Signal.watching (readTVar danger), flee), handling, (pure True, readTVarIO done >>= \all' -> unless (length all' == 300) hang)]
+          alarms = forever $ do
+            replicateM_ 3 yield >> modifyIORef' dangers (+ 1)
+            atomically (writeTVar danger True) >> atomically (readTVar danger >>= check . not)
+          untilAllAreDone = readTVarIO done >>= \all' -> unless (length all' == 300) hang
+      alarms
+        ||| Signal.teleoReactive
+          [(Signal.watching (readTVar danger), flee), handling, (pure True, untilAllAreDone)]
     reverse <$> readTVarIO done `shouldReturn` [1 .. 300]
     (,) <$> readIORef begun <*> readIORef dangers >>= (`shouldSatisfy` \(n, interruptions) -> n <= 300 + interruptions)
 
@@ -163,13 +181,22 @@ wrong plan day way = do
         comes Danger = atomically (writeTVar danger True)
     _ <- simulate' . withInbox 5 (\deliver -> pure () <$ writeIORef callback deliver) $ \box -> do
       handling <- way box handle
-      Signal.teleoReactive [(Signal.watching (readTVar danger), flee), handling, (pure True, hang)] ||| (for_ day (\news -> sleep 1 >> traverse_ comes news) >> sleep 9)
+      Signal.teleoReactive [(Signal.watching (readTVar danger), flee), handling, (pure True, hang)]
+        ||| (for_ day (\news -> sleep 1 >> traverse_ comes news) >> sleep 9)
     all' <- readTVarIO done
     n <- readIORef begun
     let messages = [m | Message m <- concat day]
-        miscounted = [show m ++ " was committed " ++ show k ++ " times" | m <- messages, let k = length (filter (== m) all'), k /= 1]
+        miscounted =
+          [ show m ++ " was committed " ++ show k ++ " times"
+          | m <- messages
+          , let k = length (filter (== m) all')
+          , k /= 1
+          ]
         -- An interruption makes one begin again; so may the commit of the message before it.
-        tooMany = ["handlers began " ++ show n ++ " times" | n > 2 * length messages + length [() | Danger <- concat day]]
+        tooMany =
+          [ "handlers began " ++ show n ++ " times"
+          | n > 2 * length messages + length [() | Danger <- concat day]
+          ]
     modifyIORef' mistakes ((miscounted ++ tooMany) ++)
   readIORef mistakes
 
@@ -191,7 +218,10 @@ takenAtReturn box handle = do
   let peek = readTVar known >>= maybe (receive box >>= \m -> m <$ writeTVar known (Just m)) pure
       some = (||) <$> someUnhandled' <*> (not . null <$> readTVar known)
       someUnhandled' = (> 0) <$> unhandled box
-  pure (Signal.watching some, forever (atomically peek >>= handle >>= atomically >> atomically (writeTVar known Nothing)))
+  pure
+    ( Signal.watching some
+    , forever (atomically peek >>= handle >>= atomically >> atomically (writeTVar known Nothing))
+    )
 
 counting :: Spec
 counting = do

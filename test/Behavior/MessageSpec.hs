@@ -37,7 +37,9 @@ inbox :: Spec
 inbox = do
   prop "keeps the newest messages, in order, and counts those that it drops" $ \(Positive size) messages ->
     withInbox size (delivering messages) (\box -> atomically ((,,) <$> unhandled box <*> allOf box <*> dropped box))
-      `shouldReturn` let kept = reverse (take size (reverse (messages :: [Int]))) in (length kept, kept, length messages - length kept)
+      `shouldReturn`
+        let kept = reverse (take size (reverse (messages :: [Int])))
+         in (length kept, kept, length messages - length kept)
 
   it "refuses a capacity of less than one, and does not subscribe" $ do
     entries <- newLog
@@ -62,7 +64,12 @@ inbox = do
   it "is closed although the end of its subscription faults" $ do
     callback <- newIORef (\_ -> pure ())
     boxes <- newIORef []
-    ending (withInbox 9 (\deliver -> throwIO (Fault "unsubscribing") <$ writeIORef callback deliver) (\box -> writeIORef boxes [box]))
+    ending
+      ( withInbox
+          9
+          (\deliver -> throwIO (Fault "unsubscribing") <$ writeIORef callback deliver)
+          (\box -> writeIORef boxes [box])
+      )
       `shouldReturn` FaultedWith (show (Fault "unsubscribing"))
     readIORef callback >>= ($ 'c')
     readIORef boxes >>= traverse (atomically . unhandled) >>= (`shouldBe` [0])
@@ -80,7 +87,8 @@ handlingEach = do
     sameAs
       (\entries -> withInbox 9 (delivering messages) $ \box -> onMessage box (handler entries b) (play entries a))
       ( \entries -> withInbox 9 (delivering messages) $ \box ->
-          Signal.monitor ((> 0) <$> Signal.watching (unhandled box)) (handleNext box (handler entries b)) (play entries a)
+          Signal.monitor ((> 0) <$> Signal.watching (unhandled box)) (handleNext box (handler entries b))
+            (play entries a)
       )
 
   it "stops the task for each message, handles it, and starts the task again" $ do
@@ -105,7 +113,8 @@ handlingEach = do
 
   it "leaves the message in the inbox when its transaction throws" $
     withInbox 9 (delivering "a") $ \box -> do
-      ending (onMessage box (\_ -> pure (throwSTM (Fault "commit"))) (pure ())) `shouldReturn` FaultedWith (show (Fault "commit"))
+      ending (onMessage box (\_ -> pure (throwSTM (Fault "commit"))) (pure ()))
+        `shouldReturn` FaultedWith (show (Fault "commit"))
       atomically (receive box) `shouldReturn` 'a'
 
   it "can be interrupted while its transaction retries; then the message waits again" $ do
@@ -188,7 +197,10 @@ courier = do
     reverse <$> readTVarIO done `shouldReturn` [1 .. 300]
 
 -- | How to subscribe, and then to handle each order beside a task.
-type Handling = ((Int -> IO ()) -> IO (IO ())) -> (((Int -> Behavior (STM ())) -> Behavior () -> Behavior ()) -> Behavior ()) -> Behavior ()
+type Handling =
+  ((Int -> IO ()) -> IO (IO ()))
+  -> (((Int -> Behavior (STM ())) -> Behavior () -> Behavior ()) -> Behavior ())
+  -> Behavior ()
 
 -- | The orders and their driver; the times at which the battery becomes low. (An order takes a
 -- second.)
@@ -249,7 +261,8 @@ mockDriver = do
       sleep 10
       modifyIORef' got (map (fmap (subtract zero)))
     readIORef got `shouldReturn` [('b', 2)]
-    map Mock.entrySubject . Mock.recordEntries <$> happened world `shouldReturn` ["orders: subscribed", "orders: 'b'", "orders: unsubscribed"]
+    map Mock.entrySubject . Mock.recordEntries <$> happened world
+      `shouldReturn` ["orders: subscribed", "orders: 'b'", "orders: unsubscribed"]
 
   it "records each message" $ do
     (world, orders) <- world'
@@ -257,12 +270,15 @@ mockDriver = do
     for_ "abc" $ \m -> world `shouldRecord` eventually (noted ("orders: " ++ show m))
 
   it "throws what the callback threw when the subscription ends" $ do
-    for_ [(throwIO (Fault "callback"), FaultedWith (show (Fault "callback"))), (throwIO ThreadKilled, CancelledBy "thread killed")] $
-      \(callback, expected) -> do
-        (_, orders) <- world'
-        ended <- newIORef Nothing
-        _ <- simulate $ ending (orders (const callback) >>= (sleep 2 >>)) >>= writeIORef ended . Just
-        readIORef ended `shouldReturn` Just expected
+    for_
+      [ (throwIO (Fault "callback"), FaultedWith (show (Fault "callback")))
+      , (throwIO ThreadKilled, CancelledBy "thread killed")
+      ]
+      $ \(callback, expected) -> do
+          (_, orders) <- world'
+          ended <- newIORef Nothing
+          _ <- simulate $ ending (orders (const callback) >>= (sleep 2 >>)) >>= writeIORef ended . Just
+          readIORef ended `shouldReturn` Just expected
 
   it "refuses times that decrease or are negative, and names that are used" $ do
     world <- newMock
@@ -271,7 +287,8 @@ mockDriver = do
     refused [(2, 'a'), (1, 'b')] `shouldReturn` FaultedWith (rule ++ "1.0 must not come after 2.0")
     refused [(-1, 'a')] `shouldReturn` FaultedWith (rule ++ "-1.0 is no such time")
     refused [(1, 'a'), (1, 'b')] `shouldReturn` Gave ()
-    refused [(1, 'a')] `shouldReturn` FaultedWith "driver \"orders\": something else in this world has this name already"
+    refused [(1, 'a')]
+      `shouldReturn` FaultedWith "driver \"orders\": something else in this world has this name already"
  where
   world' = newMock >>= \world -> (,) world <$> driver world "orders" [(1, 'a'), (2, 'b'), (3, 'c')]
 

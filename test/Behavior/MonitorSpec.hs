@@ -49,19 +49,24 @@ spec = guarded . describe "monitor" $ do
       let expected = concatMap (\(NonNegative n) -> "task" : replicate (n + 1) "recovery") script
       (expected ++ ["task"] ===) <$> notes entries
 
-  for_ [("is done twice, when it is the result of an inner operator", False), ("is done once, when the branch itself records it", True)] $
-    \(often, recording) -> it ("work that is interrupted between its end and an inner operator's return " ++ often) $ do
-      entries <- newLog
-      low <- newTVarIO False
-      done <- newTVarIO False
-      let deliver = sleep 1 >> note entries "deliver"
-          once = atomically (readTVar done) >>= \is -> unless is . mask_ $ deliver >> atomically (writeTVar done True)
-          phone = hang `uninterruptibly` sleep 2
-          mission = Signal.whileHolding (pure True) (firstOf [if recording then once else deliver, phone])
-          charge = note entries "charge" >> atomically (writeTVar low False)
-      run <- simulate (Signal.monitor (watchedVar low) charge mission ||| (sleep 2 >> atomically (writeTVar low True) >> hang))
-      explain (outcome run) `shouldBe` "it returned"
-      notes entries `shouldReturn` (if recording then ["deliver", "charge"] else ["deliver", "charge", "deliver"])
+  for_
+    [ ("is done twice, when it is the result of an inner operator", False)
+    , ("is done once, when the branch itself records it", True)
+    ]
+    $ \(often, recording) ->
+      it ("work that is interrupted between its end and an inner operator's return " ++ often) $ do
+        entries <- newLog
+        low <- newTVarIO False
+        done <- newTVarIO False
+        let deliver = sleep 1 >> note entries "deliver"
+            once = atomically (readTVar done) >>= \is -> unless is . mask_ $ deliver >> atomically (writeTVar done True)
+            phone = hang `uninterruptibly` sleep 2
+            mission = Signal.whileHolding (pure True) (firstOf [if recording then once else deliver, phone])
+            charge = note entries "charge" >> atomically (writeTVar low False)
+        let falls = sleep 2 >> atomically (writeTVar low True) >> hang
+        run <- simulate (Signal.monitor (watchedVar low) charge mission ||| falls)
+        explain (outcome run) `shouldBe` "it returned"
+        notes entries `shouldReturn` (if recording then ["deliver", "charge"] else ["deliver", "charge", "deliver"])
 
   it "recovers even if the condition is false again when the task has ended" $ do
     entries <- newLog

@@ -218,7 +218,8 @@ outcomes operator = describe (called operator) $ do
           end = case predicted (kind operator) isCancelled branches of
             Gave numbers -> Gave (gives operator numbers)
             bad -> bad
-      when (possible (kind operator) isCancelled branches && (forcesTies operator || not (isTie (kind operator) branches))) $
+      let isDetermined = forcesTies operator || not (isTie (kind operator) branches)
+      when (possible (kind operator) isCancelled branches && isDetermined) $
         it (sentence one other isCancelled) $
           for_ orders $ \order -> runBranchesIn order operator isCancelled branches `shouldReturn` end
   when (forcesTies operator) $
@@ -226,7 +227,9 @@ outcomes operator = describe (called operator) $ do
       property $ \isCancelled ->
         forAll (testBranches <$> (choose (1, 6) >>= \n -> vectorOf n arbitrary)) $ \branches ->
           possible (kind operator) isCancelled branches
-            ==> ioProperty (allAre (predicted (kind operator) isCancelled branches) <$> traverse (\order -> runBranchesIn order operator isCancelled branches) orders)
+            ==> ioProperty $
+              allAre (predicted (kind operator) isCancelled branches)
+                <$> traverse (\order -> runBranchesIn order operator isCancelled branches) orders
  where
   orders = [minBound .. maxBound]
   allAre end = conjoin . map (=== end)
@@ -356,7 +359,8 @@ laws = do
   symmetric operator branches =
     if length (filter (isFaulty . plan) branches) == 2
       then pure (property True) -- two faults are a tie, too
-      else property <$> ((===) <$> runBranches operator False branches <*> runBranches operator False (reverse branches))
+      else property
+        <$> ((===) <$> runBranches operator False branches <*> runBranches operator False (reverse branches))
   voided = \case
     Gave _ -> Gave ()
     FailedWith e -> FailedWith e

@@ -28,7 +28,16 @@ pauses = do
   it "pauses and resumes whenever the condition changes, and does not stop the behaviour" $ do
     told <- story [(2.5, True), (5, False), (6.5, True), (7, False)] $ \condition record ->
       pausedWhile condition (record "pause") (record "resume") (for_ ["a", "b", "c"] (\leg -> record leg >> sleep 3))
-    told `shouldBe` [("a", 0), ("pause", 2.5), ("b", 3), ("resume", 5), ("c", 6), ("pause", 6.5), ("resume", 7), ("Gave ()", 9)]
+    told
+      `shouldBe` [ ("a", 0)
+                 , ("pause", 2.5)
+                 , ("b", 3)
+                 , ("resume", 5)
+                 , ("c", 6)
+                 , ("pause", 6.5)
+                 , ("resume", 7)
+                 , ("Gave ()", 9)
+                 ]
 
   it "does not begin while the condition holds, and does not pause what has not begun" $ do
     told <- story [(0, True), (2, False)] $ \condition record ->
@@ -47,39 +56,51 @@ pauses = do
 
   it "resumes beside the cleanup of the behaviour when it is cancelled" $ do
     told <- story [(1, True)] $ \condition record ->
-      timeout 2 (pausedWhile condition (record "pause") (record "resume") (sleep 9 `onException` uninterruptibleMask_ (sleep 1 >> record "cleaned up"))) ? pure ()
+      let task = sleep 9 `onException` uninterruptibleMask_ (sleep 1 >> record "cleaned up")
+       in timeout 2 (pausedWhile condition (record "pause") (record "resume") task) ? pure ()
     told `shouldBe` [("pause", 1), ("resume", 2), ("cleaned up", 3), ("Gave ()", 3)]
 
   it "stops the behaviour, and throws, when pausing or resuming fails or faults" $
-    for_ [(failWith "no", FailedWith "FailedBecause \"no\""), (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())] $ \(wrong, end) -> do
-      let act record = sleep 9 `onException` record "stopped"
-      one <- story [(1, True), (2, False)] $ \condition record -> pausedWhile condition wrong (record "resume") (act record)
-      one `shouldBe` [("resume", 1), ("stopped", 1), (show end, 1)]
-      other <- story [(1, True), (2, False)] $ \condition record -> pausedWhile condition (record "pause") wrong (act record)
-      other `shouldBe` [("pause", 1), ("stopped", 2), (show end, 2)]
+    for_
+      [ (failWith "no", FailedWith "FailedBecause \"no\"")
+      , (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())
+      ]
+      $ \(wrong, end) -> do
+        let act record = sleep 9 `onException` record "stopped"
+        one <- story [(1, True), (2, False)] $ \condition record ->
+          pausedWhile condition wrong (record "resume") (act record)
+        one `shouldBe` [("resume", 1), ("stopped", 1), (show end, 1)]
+        other <- story [(1, True), (2, False)] $ \condition record ->
+          pausedWhile condition (record "pause") wrong (act record)
+        other `shouldBe` [("pause", 1), ("stopped", 2), (show end, 2)]
 
   it "ignores a failure of resuming after the end of the behaviour, and throws a fault of it" $
-    for_ [(failWith "no", Gave ()), (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())] $ \(wrong, end) -> do
-      told <- story [(1, True)] $ \condition record -> pausedWhile condition (record "pause") wrong (sleep 5)
-      told `shouldBe` [("pause", 1), (show end, 5)]
+    for_ [(failWith "no", Gave ()), (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())] $
+      \(wrong, end) -> do
+        told <- story [(1, True)] $ \condition record -> pausedWhile condition (record "pause") wrong (sleep 5)
+        told `shouldBe` [("pause", 1), (show end, 5)]
 
   it "stops the behaviour when the condition fails, faults or has no value any more" $
     for_ [SensorFailure, SensorFault, NoValue] $ \dead -> do
       condition <- newTestCondition False
       stopped <- newTVarIO False
-      run <- simulate (pausedWhile (watched condition) (pure ()) (pure ()) (sleep 9 `onException` atomically (writeTVar stopped True)) `both` (sleep 1 >> set condition dead))
+      let task = sleep 9 `onException` atomically (writeTVar stopped True)
+      run <- simulate (pausedWhile (watched condition) (pure ()) (pure ()) task `both` (sleep 1 >> set condition dead))
       explain (outcome run) `shouldNotContain` "returned"
       readTVarIO stopped `shouldReturn` True
 
   describe "pauses and resumes in turn, and leaves nothing paused," $ do
     it "under random schedules" $ inTurn (randomly 1000) 4 [True, False, True, False, True]
-    it "under random schedules in which it is cancelled as the condition changes" $ inTurn (randomly 1000) 2 [True, False]
-    it "under all schedules of a behaviour that makes the condition true, and ends" . void . explore (exhaustively 1) $ \simulate' -> do
-      near <- newTVarIO False
-      paused <- newTVarIO False
-      let become = atomically . writeTVar paused
-      _ <- simulate' (pausedWhile (watchedVar near) (become True >> checkpoint) (become False) (atomically (writeTVar near True)))
-      readTVarIO paused `shouldReturn` False
+    it "under random schedules in which it is cancelled as the condition changes" $
+      inTurn (randomly 1000) 2 [True, False]
+    it "under all schedules of a behaviour that makes the condition true, and ends"
+      . void . explore (exhaustively 1) $ \simulate' -> do
+        near <- newTVarIO False
+        paused <- newTVarIO False
+        let become = atomically . writeTVar paused
+        let nears = atomically (writeTVar near True)
+        _ <- simulate' (pausedWhile (watchedVar near) (become True >> checkpoint) (become False) nears)
+        readTVarIO paused `shouldReturn` False
 
 stops :: Spec
 stops = do
@@ -103,7 +124,8 @@ stops = do
       entries <- newLog
       var <- newTVarIO False
       let changes = for_ [True, False, True, False] (\v -> sleep 1 >> atomically (writeTVar var v))
-      run <- simulate' (both changes (stopping (watchedVar var) ((note entries "begin" >> sleep 2) `onException` note entries "stopped")))
+      let task = (note entries "begin" >> sleep 2) `onException` note entries "stopped"
+      run <- simulate' (both changes (stopping (watchedVar var) task))
       all' <- notes entries
       modifyIORef' found ((explain (outcome run), all') :)
     readIORef found

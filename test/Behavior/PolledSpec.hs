@@ -96,15 +96,18 @@ common = for_ either' $ \(name, run) -> do
     run (not <$> opened entered) main (note entries "other")
     notes entries `shouldReturn` ["main"]
 
-  for_ [("fails", throwIO Failed, FailedWith "Failed"), ("faults", throwIO (Fault "bug"), FaultedWith (show (Fault "bug")))] $
-    \(manner, act, end) ->
-      it (name ++ " does not treat as false a test that " ++ manner) $ do
-        entries <- newLog
-        entered <- newGate
-        let test = opened entered >>= \isEntered -> if isEntered then act else pure True
-            main = (open entered >> hang) `onException` note entries "main is over"
-        ending (run test main (note entries "other")) `shouldReturn` end
-        notes entries `shouldReturn` ["main is over"]
+  for_
+    [ ("fails", throwIO Failed, FailedWith "Failed")
+    , ("faults", throwIO (Fault "bug"), FaultedWith (show (Fault "bug")))
+    ]
+    $ \(manner, act, end) ->
+        it (name ++ " does not treat as false a test that " ++ manner) $ do
+          entries <- newLog
+          entered <- newGate
+          let test = opened entered >>= \isEntered -> if isEntered then act else pure True
+              main = (open entered >> hang) `onException` note entries "main is over"
+          ending (run test main (note entries "other")) `shouldReturn` end
+          notes entries `shouldReturn` ["main is over"]
 
   for_ [("unmasked", id), ("masked", mask_), ("uninterruptible", uninterruptibleMask_)] $
     \(state, masked) ->

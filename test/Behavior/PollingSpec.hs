@@ -66,7 +66,8 @@ slots = do
     for_ [1 .. 5] $ \seed -> do
       entries <- newLog
       let late = Signal.polling 0.01 (False <$ note entries ())
-      _ <- simulateWith defaultSimOptions {timerSlip = 0.004, scheduled = Seeded seed} (Signal.monitor late (pure ()) (sleep 5 ||| forever (sleep 0.0031)))
+      _ <- simulateWith defaultSimOptions {timerSlip = 0.004, scheduled = Seeded seed}
+        (Signal.monitor late (pure ()) (sleep 5 ||| forever (sleep 0.0031)))
       notes entries >>= (`shouldSatisfy` (`elem` [500, 501])) . length
 
   it "after a slow reading the slots that it missed are skipped, and not made up for" $ do
@@ -119,13 +120,14 @@ slots = do
     Signal.switch (sensing level) (\n -> when (n < 50) hang)
     mostInside occupancy `shouldReturn` 1
 
-  for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN"), (5e-324, "5.0e-324"), (0.0000009, "0.0000009")] $ \(period, shown) -> do
-    it ("a period of " ++ shown ++ " is refused, and nothing starts") $ do
-      entries <- newLog
-      let signal = Signal.polling period (True <$ note entries "reading")
-      ending (Signal.rSelect signal (note entries "left") (note entries "right"))
-        `shouldReturn` FaultedWith ("polling: a period is at least 0.000001 seconds, not " ++ shown)
-      notes entries `shouldReturn` []
+  for_ [(0, "0.0"), (-1, "-1.0"), (0 / 0, "NaN"), (5e-324, "5.0e-324"), (0.0000009, "0.0000009")] $
+    \(period, shown) -> do
+      it ("a period of " ++ shown ++ " is refused, and nothing starts") $ do
+        entries <- newLog
+        let signal = Signal.polling period (True <$ note entries "reading")
+        ending (Signal.rSelect signal (note entries "left") (note entries "right"))
+          `shouldReturn` FaultedWith ("polling: a period is at least 0.000001 seconds, not " ++ shown)
+        notes entries `shouldReturn` []
 
 deciding :: Spec
 deciding = do

@@ -124,27 +124,30 @@ cancelled = do
     notes entries `shouldReturn` []
 
   -- (Where 'abandoning' limits the wait, GHC does not take the cleanup for deadlocked.)
-  inEach (filter ((/= "abandoning: branch") . placeName) threaded) "receives no deadlock exception while it waits for a cleanup that is deadlocked" $ \place -> do
-    entries <- newLog
-    inside <- newGate
-    cleaning <- newGate
-    recovered <- newGate
-    let deadlock = newEmptyMVar >>= takeMVar :: IO ()
-        act =
-          (open inside >> hang) `onException` do
-            open cleaning
-            deadlock `catch` \BlockedIndefinitelyOnMVar -> note entries "recovered"
-    -- GHC detects a deadlock when it collects garbage, which this thread makes it do; the
-    -- thread holds no reference to any thread.
-    _ <- forkIO $ pass cleaning >> untilOpen recovered (performMajorGC >> yield)
-    withThread (leavingNothing (placed place act)) $ \caller -> do
-      pass inside
-      throwTo (asyncThreadId caller) theCancel
-      -- This thread is deadlocked as well.
-      end <- endingOf <$> awaitUninterruptibly (atomically (waitCatchSTM caller))
-      open recovered
-      end `shouldBe` isCancelled
-      notes entries `shouldReturn` ["recovered"]
+  inEach
+    (filter ((/= "abandoning: branch") . placeName) threaded)
+    "receives no deadlock exception while it waits for a cleanup that is deadlocked"
+    $ \place -> do
+      entries <- newLog
+      inside <- newGate
+      cleaning <- newGate
+      recovered <- newGate
+      let deadlock = newEmptyMVar >>= takeMVar :: IO ()
+          act =
+            (open inside >> hang) `onException` do
+              open cleaning
+              deadlock `catch` \BlockedIndefinitelyOnMVar -> note entries "recovered"
+      -- GHC detects a deadlock when it collects garbage, which this thread makes it do; the
+      -- thread holds no reference to any thread.
+      _ <- forkIO $ pass cleaning >> untilOpen recovered (performMajorGC >> yield)
+      withThread (leavingNothing (placed place act)) $ \caller -> do
+        pass inside
+        throwTo (asyncThreadId caller) theCancel
+        -- This thread is deadlocked as well.
+        end <- endingOf <$> awaitUninterruptibly (atomically (waitCatchSTM caller))
+        open recovered
+        end `shouldBe` isCancelled
+        notes entries `shouldReturn` ["recovered"]
 
 branches :: Spec
 branches = do

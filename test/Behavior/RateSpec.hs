@@ -49,7 +49,8 @@ throttle = do
 
   it "of zero seconds follows its signal" $ do
     condition <- newTestCondition True
-    Signal.rSelect (Signal.throttle 0 (watched condition)) (set condition (Value False) >> hang) (pure "right") `shouldReturn` "right"
+    Signal.rSelect (Signal.throttle 0 (watched condition)) (set condition (Value False) >> hang) (pure "right")
+      `shouldReturn` "right"
 
   for_ [SensorFailure, SensorFault, NoValue] $ \newState ->
     it ("does not wait when the new state of its signal is " ++ show newState) $ do
@@ -92,7 +93,10 @@ olderThan = do
   prop "is true while the time is at least that long ago" $
     forAll ((,) <$> choose (0, 6 :: Int) <*> script) $ \(whole, steps) -> ioProperty $ do
       let limit = fromIntegral whole + 0.37
-          stamps = scanl1 (\(_, before) (t, stamp) -> (t, max before stamp)) [(t, t - fromIntegral (2 * back)) | (t, back) <- steps]
+          stamps =
+            scanl1
+              (\(_, before) (t, stamp) -> (t, max before stamp))
+              [(t, t - fromIntegral (2 * back)) | (t, back) <- steps]
       (=== ages limit stamps) <$> observed (\stamp -> (,) <$> stamp <*> Signal.olderThan limit stamp) stamps
 
   it "judges a time that is earlier than the one before at once" $ do
@@ -105,7 +109,9 @@ olderThan = do
     stamp <- newTVarIO 0
     end <- newIORef Nothing
     let script' = sleep 1 >> atomically (writeTVar stamp (0 / 0))
-    run <- simulate $ ending (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (script' >> hang)) >>= writeIORef end . Just
+    run <- simulate $
+      ending (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (script' >> hang))
+        >>= writeIORef end . Just
     finished run `shouldBe` 1
     readIORef end `shouldReturn` Just (FaultedWith "olderThan: a point in time is a number, not NaN")
 
@@ -136,7 +142,8 @@ missing signal = do
   _ <- explore (randomly 100) $ \simulate' -> do
     place <- newTVarIO 'a'
     fresh <- newTVarIO False
-    let driver = sleep 1 >> atomically (writeTVar place 'b' >> writeTVar fresh True) >> atomically (writeTVar fresh False)
+    let driver =
+          sleep 1 >> atomically (writeTVar place 'b' >> writeTVar fresh True) >> atomically (writeTVar fresh False)
         robot = Signal.waitUntil (signal (watchedVar place) (watchedVar fresh))
     run <- simulate' (robot ||| (driver >> sleep 9))
     when (finished run > 1) (writeIORef missed True)
@@ -168,7 +175,8 @@ naming = do
 replanning :: Spec
 replanning = do
   it "stands still only during the first planning, if the planner runs beside the switch" $
-    standing (\wanted plan path fly -> forever (Signal.waitUntil wanted >> plan) ||| Signal.switch path fly) `shouldReturn` 5
+    standing (\wanted plan path fly -> forever (Signal.waitUntil wanted >> plan) ||| Signal.switch path fly)
+      `shouldReturn` 5
   it "stands still during each, if planning interrupts the flight" $
     standing (\wanted plan path fly -> Signal.monitor wanted plan (Signal.switch path pure >>= fly)) `shouldReturn` 15
 
@@ -214,7 +222,8 @@ throttled seconds = \case
     let until' = t + seconds
         (meanwhile, after) = span ((<= until') . fst) later
         latest = last (value : map snd meanwhile)
-     in (t, value) : throttled seconds (if latest /= value then (until', latest) : after else dropWhile ((== value) . snd) after)
+        others = if latest /= value then (until', latest) : after else dropWhile ((== value) . snd) after
+     in (t, value) : throttled seconds others
 
 -- | What 'Signal.changes' should give.
 counted :: Timed Int -> Timed Int

@@ -15,7 +15,8 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck hiding (Failure)
 
 import Behavior
-import Behavior.Sim (SimOptions (..), Outcome (..), Run (outcome), Schedule (Seeded), defaultSimOptions, explain, simulateWith)
+import Behavior.Sim
+  (SimOptions (..), Outcome (..), Run (outcome), Schedule (Seeded), defaultSimOptions, explain, simulateWith)
 import Behavior.Time
 import Support
 
@@ -53,7 +54,8 @@ retries = do
 
   it "refuses a negative delay when it is due" $
     for_ [-1, 0 / 0] $ \delay ->
-      ending (retrying [delay] failed) `shouldReturn` (FaultedWith ("sleep: a duration is zero or more seconds, not " ++ show delay) :: Ending ())
+      ending (retrying [delay] failed)
+        `shouldReturn` (FaultedWith ("sleep: a duration is zero or more seconds, not " ++ show delay) :: Ending ())
 
   it "reports each failure but the last, before the pause" $ do
     (end, reports) <- observing $ \entries -> do
@@ -64,7 +66,10 @@ retries = do
 
   it "gives up when the report throws" $ do
     (end, starts) <- timed $ \started ->
-      retryingWith (\why -> when (show why == "FailedBecause \"1\"") (throwIO why)) (repeat 1) (started >>= failWith . show)
+      retryingWith
+        (\why -> when (show why == "FailedBecause \"1\"") (throwIO why))
+        (repeat 1)
+        (started >>= failWith . show)
     (end, starts) `shouldBe` (FailedWith "FailedBecause \"1\"", [0, 1])
 
 periods :: Spec

@@ -36,7 +36,8 @@ spec = guarded $ do
     ending (resumable left (stopAt 'b' (throwIO (Fault "arm")))) `shouldReturn` FaultedWith (show (Fault "arm"))
     readTVarIO left `shouldReturn` "bc"
     entered <- newGate
-    cancelling (resumable left (stopAt 'c' (open entered >> hang))) (pass entered) `shouldReturn` CancelledBy (show (Cancel "the caller"))
+    cancelling (resumable left (stopAt 'c' (open entered >> hang))) (pass entered)
+      `shouldReturn` CancelledBy (show (Cancel "the caller"))
     readTVarIO left `shouldReturn` "c"
 
   it "runs the behaviour in the caller's masking state" $
@@ -164,8 +165,10 @@ repeatedStep plan carryingOut = do
         drains = for_ [2, 4 :: Seconds] $ \_ -> sleep 2 >> atomically (writeTVar low True)
         orders deliver = pure () <$ for_ [1, 2] deliver
         order inbox = attempt 2 (handleNext inbox (\n -> carryingOut progress n (step n)))
-        allOrders inbox = atomically (unhandled inbox) >>= \n -> if n == 0 then pure () else order inbox >> allOrders inbox
-    _ <- simulate' (withInbox 5 orders (Signal.monitor (Signal.watching (readTVar low)) recharge . allOrders) ||| (drains >> hang))
+        allOrders inbox =
+          atomically (unhandled inbox) >>= \n -> if n == 0 then pure () else order inbox >> allOrders inbox
+        robot = withInbox 5 orders (Signal.monitor (Signal.watching (readTVar low)) recharge . allOrders)
+    _ <- simulate' (robot ||| (drains >> hang))
     steps <- readIORef done
     when (length steps > length (nub steps)) $ writeIORef found True
   readIORef found

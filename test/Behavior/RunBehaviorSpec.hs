@@ -82,7 +82,10 @@ spec = guarded . describe "runBehavior" $ do
         >>= (`shouldBe` Terminated signal False)
 
     it ("does not end the process at a SIGHUP after a " ++ name ++ ": the cleanup runs to its end") $
-      inChild (byDefault sigHUP >> runBehavior (uninterruptibly (raiseSignal signal >> hang) (installed sigHUP >>= replicateM_ 2)))
+      inChild
+        ( byDefault sigHUP
+            >> runBehavior (uninterruptibly (raiseSignal signal >> hang) (installed sigHUP >>= replicateM_ 2))
+        )
         >>= (`shouldBe` Exited (ExitFailure code))
 
     it ("ends the process at once at a signal of the other kind after a " ++ name) $
@@ -262,7 +265,9 @@ spinning = do
   hGetLine printed `shouldReturn` "now"
   -- (The child looks at a clock that a test cannot advance. Without -threaded GHC keeps 16 signals that have no handler
   -- yet, and ends the program at the next.)
-  let untilEnded = signalProcess sigTERM child >> getProcessStatus False False child >>= maybe (threadDelay 250000 >> untilEnded) pure
+  let untilEnded =
+        signalProcess sigTERM child >> getProcessStatus False False child
+          >>= maybe (threadDelay 250000 >> untilEnded) pure
   (,) <$> untilEnded <*> hGetContents printed
 
 -- | Raises it without letting another Haskell thread run.

@@ -86,7 +86,7 @@ interrupting = do
   it "returns when the thread has received the exception" $ do
     inside <- newGate
     mayEnd <- newGate
-    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
+    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang :: IO ()))
     pass inside
     withThread (interrupt (threadId thread) (Cancel "thread")) $ \caller -> do
       poll caller >>= (`shouldBe` True) . isNothing
@@ -109,7 +109,7 @@ interrupting = do
   it "has a variant, throwToAll, that does not wait" $ do
     inside <- newGate
     mayEnd <- newGate
-    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) :: IO (Thread (Either SomeException ()))
+    thread <- mask_ (start label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang :: IO ()))
     pass inside
     throwToAll (const (Cancel "thread")) [threadId thread]
     open mayEnd
@@ -163,12 +163,13 @@ waiting = do
 
   it "cannot be interrupted inside awaitUninterruptibly" $ do
     var <- newTVarIO False
-    withThread (awaitUninterruptibly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $ \caller -> do
-      awaitIdle (asyncThreadId caller)
-      throwing (asyncThreadId caller) (Cancel "caller")
-      stillRunning caller
-      atomically (writeTVar var True)
-      awaitOver (asyncThreadId caller)
+    withThread (awaitUninterruptibly (atomically (readTVar var >>= \there -> if there then pure 'a' else retry))) $
+      \caller -> do
+        awaitIdle (asyncThreadId caller)
+        throwing (asyncThreadId caller) (Cancel "caller")
+        stillRunning caller
+        atomically (writeTVar var True)
+        awaitOver (asyncThreadId caller)
 
   it "has a checkpoint where a cancellation arrives that was masked until then" $ do
     ready <- newGate
@@ -230,7 +231,8 @@ scopes = do
       cleaning <- newGate
       mayEnd <- newGate
       started <- branch scope label $
-        (open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note entries "cleaned up") :: IO (Branch ())
+        (open inside >> hang)
+          `onException` (open cleaning >> pass mayEnd >> note entries "cleaned up") :: IO (Branch ())
       pass inside
       requestStopAsync cause [SomeBranch started]
       requestStopAsync cause [SomeBranch started]
@@ -243,7 +245,8 @@ scopes = do
     (end, done) <- observing $ \entries -> inScope $ \scope -> do
       insides <- replicateM 3 newGate
       mayEnd <- newGate
-      started <- traverse (\inside -> branch scope label (uninterruptibleMask_ (open inside >> pass mayEnd) >> hang)) insides
+      let act inside = uninterruptibleMask_ (open inside >> pass mayEnd) >> hang
+      started <- traverse (branch scope label . act) insides
       traverse_ pass insides
       requestStopAsync cause (map SomeBranch (started :: [Branch ()]))
       note entries "requested"
@@ -266,7 +269,9 @@ scopes = do
     mayEnd <- newGate
     (end, done) <- observing $ \entries -> do
       let operator = inScope $ \scope -> do
-            _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
+            _ <-
+              branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd))
+                :: IO (Branch ())
             pass inside
             pure (failed :: IO ())
           -- Otherwise the handler of the failure would be run, and interrupted.
@@ -292,7 +297,9 @@ scopes = do
     (end, done) <- observing $ \entries -> do
       let operator = inScope $ \scope -> do
             inside <- newGate
-            _ <- branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd)) :: IO (Branch ())
+            _ <-
+              branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd))
+                :: IO (Branch ())
             pass inside
             pure (pure "verdict")
       withThread (mask_ (operator >>= note entries) >> hang :: IO ()) $ \caller -> do

@@ -65,7 +65,8 @@ filters =
         let change k = do
               atomically (writeTVar level (k `mod` 2))
               atomically (readTVar seen >>= check . (> k))
-        Signal.switch (iterate filtering (Signal.watching (readTVar level)) !! depth) (\_ -> atomically (modifyTVar' seen (+ 1)) >> hang)
+        Signal.switch (iterate filtering (Signal.watching (readTVar level)) !! depth)
+          (\_ -> atomically (modifyTVar' seen (+ 1)) >> hang)
           ||| for_ [0 .. 200] change
  where
   all' =

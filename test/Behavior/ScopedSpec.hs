@@ -77,7 +77,8 @@ spec = guarded $ do
     end `shouldBe` (FailedWith (show (FailedBecause "forked")) :: Ending ())
     done `shouldMatchList` ["other", "scoped"]
 
-  it "prefers the fault of the scoped behaviour to those of forked ones, and that of an earlier fork to a later one's" $ do
+  it "prefers the fault of the scoped behaviour to those of forked ones, \
+     \and that of an earlier fork to a later one's" $ do
     let faulty gate name' = (open gate >> hang) `onException` throwIO (Fault name') :: IO ()
         faults theirs own = do
           inside <- newGate
@@ -106,7 +107,8 @@ spec = guarded $ do
       )
       `shouldReturn` 'a'
 
-  it "fails to fork while all is being stopped, in a cleanup of the scoped behaviour or of a child, and nothing runs" $ do
+  it "fails to fork while all is being stopped, in a cleanup of the scoped behaviour or of a child, \
+     \and nothing runs" $ do
     inside <- newGate
     inside' <- newGate
     let forking entries nursery = ending (void (fork nursery (note entries "forked"))) >>= note entries . show
@@ -138,7 +140,11 @@ spec = guarded $ do
     void . explore (randomly 300) $ \simulate' -> do
       faults <- newTVarIO False
       let faulty = atomically (writeTVar faults True) >> throwIO (Fault "child")
-          body nursery = replicateM_ 14 (fork nursery (pure ())) >> void (fork nursery faulty :: IO (Child ())) >> fork nursery (pure ()) >> hang
+          body nursery =
+            replicateM_ 14 (fork nursery (pure ()))
+              >> void (fork nursery faulty :: IO (Child ()))
+              >> fork nursery (pure ())
+              >> hang
       run <- simulate' (scoped body ||| atomically (readTVar faults >>= check))
       endOf (outcome run) `shouldBe` FaultedWith (show (Fault "child"))
 
@@ -154,20 +160,24 @@ spec = guarded $ do
 children :: Spec
 children = do
   it "gives the result, or throws the failure or the fault, also when scoped has ended" $
-    for_ [(pure 'a', Gave 'a'), (failWith "child", FailedWith (show (FailedBecause "child"))), (throwIO (Fault "child"), FaultedWith (show (Fault "child")))] $
-      \(act, expected) -> do
-        box <- newEmptyMVar
-        end <- ending . scoped $ \nursery -> do
-          mayEnd <- newGate
-          child <- fork nursery (pass mayEnd >> act)
-          putMVar box child
-          atomically (tryAwait child) >>= (`shouldBe` True) . isNothing
-          open mayEnd
-          atomically (await child)
-        end `shouldBe` expected
-        child <- takeMVar box
-        ending (atomically (await child)) `shouldReturn` expected
-        (fmap endingOf <$> atomically (tryAwait child)) `shouldReturn` Just expected
+    for_
+      [ (pure 'a', Gave 'a')
+      , (failWith "child", FailedWith (show (FailedBecause "child")))
+      , (throwIO (Fault "child"), FaultedWith (show (Fault "child")))
+      ]
+      $ \(act, expected) -> do
+          box <- newEmptyMVar
+          end <- ending . scoped $ \nursery -> do
+            mayEnd <- newGate
+            child <- fork nursery (pass mayEnd >> act)
+            putMVar box child
+            atomically (tryAwait child) >>= (`shouldBe` True) . isNothing
+            open mayEnd
+            atomically (await child)
+          end `shouldBe` expected
+          child <- takeMVar box
+          ending (atomically (await child)) `shouldReturn` expected
+          (fmap endingOf <$> atomically (tryAwait child)) `shouldReturn` Just expected
 
   it "throws the failure of a child that has failed to a cleanup that awaits it" $ do
     (_, done) <- observing $ \entries ->
@@ -177,13 +187,15 @@ children = do
         (open inside >> hang) `onException` (ending (atomically (await child)) >>= note entries) :: IO ()
     done `shouldBe` [FailedWith (show (FailedBecause "child"))]
 
-  it "throws ChildStopped to a cleanup that awaits a child which was stopped with it, when the child's cleanup has ended" $ do
+  it "throws ChildStopped to a cleanup that awaits a child which was stopped with it, \
+     \when the child's cleanup has ended" $ do
     (end, done) <- observing $ \entries ->
       scoped $ \nursery -> do
         inside <- newGate
         inside' <- newGate
         one <- fork nursery ((open inside >> hang) `onException` note entries "its cleanup") :: IO (Child ())
-        _ <- fork nursery $ (open inside' >> hang) `onException` (ending (atomically (await one)) >>= note entries . show)
+        _ <- fork nursery $
+          (open inside' >> hang) `onException` (ending (atomically (await one)) >>= note entries . show)
         pass inside
         pass inside'
     (end, done) `shouldBe` (Gave (), ["its cleanup", show (stopped :: Ending ())])
@@ -229,7 +241,8 @@ children = do
       let body nursery = do
             inside <- newGate
             -- An interruptible cleanup.
-            child <- fork nursery ((open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note entries "to its end"))
+            child <- fork nursery
+              ((open inside >> hang) `onException` (open cleaning >> pass mayEnd >> note entries "to its end"))
             pass inside
             requestStop child
             pass cleaning
@@ -256,15 +269,18 @@ children = do
       `shouldReturn` 'a'
 
   it "throws the fault or the failure of the cleanup of a child whose stop was requested" $
-    for_ [(throwIO (Fault "cleanup"), FaultedWith (show (Fault "cleanup"))), (failWith "cleanup", FailedWith (show (FailedBecause "cleanup")))] $
-      \(cleanup, expected) -> do
-        end <- ending . scoped $ \nursery -> do
-          inside <- newGate
-          child <- fork nursery ((open inside >> hang) `onException` cleanup) :: IO (Child ())
-          pass inside
-          requestStop child
-          hang
-        end `shouldBe` (expected :: Ending ())
+    for_
+      [ (throwIO (Fault "cleanup"), FaultedWith (show (Fault "cleanup")))
+      , (failWith "cleanup", FailedWith (show (FailedBecause "cleanup")))
+      ]
+      $ \(cleanup, expected) -> do
+          end <- ending . scoped $ \nursery -> do
+            inside <- newGate
+            child <- fork nursery ((open inside >> hang) `onException` cleanup) :: IO (Child ())
+            pass inside
+            requestStop child
+            hang
+          end `shouldBe` (expected :: Ending ())
 
   it "throws the failure of another child also when the stop of one was requested" $
     for_ [1 .. 300 :: Int] $ \n -> do
@@ -282,7 +298,9 @@ children = do
         _ <- atomically (await ended)
         requestStop ended
         inside <- newGate
-        _ <- fork nursery ((open inside >> hang) `onException` (requestStop ended >> note entries "went on")) :: IO (Child ())
+        _ <-
+          fork nursery ((open inside >> hang) `onException` (requestStop ended >> note entries "went on"))
+            :: IO (Child ())
         pass inside
         pure ended
       requestStop child

@@ -23,7 +23,8 @@ import Watched
 spec :: Spec
 spec = guarded $ do
   prop "with a unit that is free, changes nothing for the behaviour" $ \script ->
-    sameAs (\entries -> atomically (newTSem 1) >>= \semaphore -> withTSem semaphore (play entries script)) (`play` script)
+    sameAs (\entries -> atomically (newTSem 1) >>= \semaphore -> withTSem semaphore (play entries script))
+      (`play` script)
 
   it "runs the behaviour in the caller's masking state" $
     for_ [id, mask_, uninterruptibleMask_] $ \inState -> do
@@ -39,7 +40,10 @@ spec = guarded $ do
     semaphore <- atomically (newTSem 1)
     entries <- newLog
     both
-      (timeout 0 (withTSem semaphore hang) ? timeout 0.001 (withTSem semaphore (hang `uninterruptibly` note entries 'a')) ? pure ())
+      ( timeout 0 (withTSem semaphore hang)
+          ? timeout 0.001 (withTSem semaphore (hang `uninterruptibly` note entries 'a'))
+          ? pure ()
+      )
       (pure ())
     withTSem semaphore (note entries 'b')
     notes entries `shouldReturn` "ab"
@@ -67,6 +71,9 @@ held plan units some = void . explore plan $ \simulate' -> do
         , (using (sleep 1) ||| sleep 1) >> hang
         , using (sleep 3) `onException` uninterruptibleMask_ (sleep 1)
         ]
-  _ <- simulate' ((firstOf (some robots) ||| sleep 2) >> replicateM_ units (atomically (waitTSem semaphore)) >> writeIORef free True)
+  _ <- simulate' $ do
+    firstOf (some robots) ||| sleep 2
+    replicateM_ units (atomically (waitTSem semaphore))
+    writeIORef free True
   readIORef free `shouldReturn` True
   mostInside counter >>= (`shouldSatisfy` (<= units))

@@ -82,7 +82,8 @@ several = do
 
   it "polls a sensor in a thread for each of its occurrences" $ do
     level <- newSensor pure
-    polled <- started (Signal.waitUntil ((\a b c -> a + b + c > 6) <$> sensing level <*> sensing level <*> sensing level))
+    let summed a b c = a + b + c
+    polled <- started (Signal.waitUntil ((> 6) <$> (summed <$> sensing level <*> sensing level <*> sensing level)))
     polled `shouldBe` replicate 3 (Label "waitUntil" "polling")
 
   it "can differ from itself, when it is not shared" $ do

@@ -36,7 +36,8 @@ spec = guarded . describe "In constant memory:" $ do
   it "five thousand periods" $ do
     left <- newIORef (5000 :: Int)
     inConstantMemory 5000 $ \step ->
-      every 0.000001 (step >> atomicModifyIORef' left (\n -> (n - 1, n)) >>= \n -> if n <= 1 then failed else pure ()) ? pure ()
+      every 0.000001 (step >> atomicModifyIORef' left (\n -> (n - 1, n)) >>= \n -> if n <= 1 then failed else pure ())
+        ? pure ()
 
   it "a million recursions through the second behaviour of ?" $
     inConstantMemory 1000000 $ \step -> do

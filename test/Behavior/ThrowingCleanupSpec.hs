@@ -59,12 +59,15 @@ fromCleanups = do
     for_ masks $ \(manner, masked) -> do
       it (name ++ ", " ++ manner ++ ": the operator ends, and throws that exception") $
         stopping operator (masked . eStop) `shouldReturn` FaultedWith (show (Fault "e-stop"))
-      it (name ++ ", " ++ manner ++ ", and again by a thread of its own: the operator ends, and throws the first exception") $
+      it (name ++ ", " ++ manner ++ ", and again by a thread of its own: \
+         \the operator ends, and throws the first exception") $
         stopping operator (\me -> masked (eStop me >> void (forkIO (throwTo me (Cancel "again")))))
           `shouldReturn` FaultedWith (show (Fault "e-stop"))
-      it (name ++ ", " ++ manner ++ ", by a thread of its own, when the caller was cancelled: the operator ends as cancelled") $ do
+      it (name ++ ", " ++ manner ++ ", by a thread of its own, when the caller was cancelled: \
+         \the operator ends as cancelled") $ do
         entered <- newGate
-        end <- withThread (do me <- myThreadId; operator (branch entered (masked (void (forkIO (eStop me))))) hang) $ \caller -> do
+        let stopsItself = do me <- myThreadId; operator (branch entered (masked (void (forkIO (eStop me))))) hang
+        end <- withThread stopsItself $ \caller -> do
           pass entered
           throwing (asyncThreadId caller) (Cancel "the caller")
           awaitEnd caller
@@ -110,11 +113,12 @@ uninterruptibleBranch =
     it (name ++ ": receives the request, though the caller was interrupted meanwhile") $ do
       entered <- newGate
       mayStop <- newGate
-      end <- withThread (operator (uninterruptibleMask_ (open entered >> pass mayStop) >> hang) (pass entered)) $ \caller -> do
-        eventually ((== ThreadBlocked BlockedOnException) <$> threadStatus (asyncThreadId caller))
-        throwing (asyncThreadId caller) (Cancel "the caller")
-        open mayStop
-        awaitEnd caller
+      end <- withThread (operator (uninterruptibleMask_ (open entered >> pass mayStop) >> hang) (pass entered)) $
+        \caller -> do
+          eventually ((== ThreadBlocked BlockedOnException) <$> threadStatus (asyncThreadId caller))
+          throwing (asyncThreadId caller) (Cancel "the caller")
+          open mayStop
+          awaitEnd caller
       end `shouldBe` CancelledBy (show (Cancel "the caller"))
 
 -- | They behave as around an action that GHC itself cannot interrupt.
@@ -128,7 +132,8 @@ limits =
         stopping <- newGate
         expired outerFirst stopping mayEnd $
           operator ((open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd)) (pass entered)
-    it ("an action that GHC cannot interrupt, " ++ order ++ ": the outer one ends it, and neither is received after it") $ do
+    it ("an action that GHC cannot interrupt, " ++ order
+        ++ ": the outer one ends it, and neither is received after it") $ do
       mayEnd <- newGate
       stopping <- newGate
       expired outerFirst stopping mayEnd (uninterruptibleMask_ (open stopping >> pass mayEnd))

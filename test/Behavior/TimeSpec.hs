@@ -134,10 +134,11 @@ timeouts = do
     observing (\entries -> timeout 0 (note entries 'a'))
       `shouldReturn` (FailedWith (show (TimedOut 0)), "")
 
-  it "does not start the behaviour when there is no time at all, under any schedule" . void . explore (randomly 100) $ \simulated -> do
-    entries <- newLog
-    _ <- simulated (timeout 0 (note entries 'a'))
-    notes entries `shouldReturn` ""
+  it "does not start the behaviour when there is no time at all, under any schedule"
+    . void . explore (randomly 100) $ \simulated -> do
+      entries <- newLog
+      _ <- simulated (timeout 0 (note entries 'a'))
+      notes entries `shouldReturn` ""
 
   it "returns when the behaviour has ended, however slow its cleanup" $ do
     (end, done) <- observing $ \entries ->
@@ -216,26 +217,29 @@ deadlines = do
     _ <- simulated (now >>= \end -> sleep 1 >> for_ [end, end + 1] (\e -> timeoutAt e (note entries 'a') ? pure ()))
     notes entries `shouldReturn` ""
 
-  it "is kept by a mission that a monitor interrupts and that tries again after pauses, under random schedules" . void . explore (randomly 300) $ \simulated -> do
-    low <- newTVarIO False
-    events <- newLog
-    let record what = now >>= \t -> note events (what, t)
-        charge = record "charge" >> sleep 10 >> atomically (writeTVar low False)
-        try' = record "try" >> sleep 100
-        drains = for_ [7, 40] (\t -> sleepUntil t >> atomically (writeTVar low True)) >> sleepForever
-        mission = do
-          end <- (+ 60) <$> now
-          Signal.monitor (Signal.watching (readTVar low)) charge (timeoutAt end (retrying (iterate (* 2) 1) (timeout 5 try')))
-    _ <- simulated ((drains ||| mission) `fallbackWith` (record . show))
-    -- 5 s for each try, pauses of 1, 2, 4 and 8 s; after each charging from the beginning.
-    notes events
-      `shouldReturn` [ ("try", 0), ("try", 6), ("charge", 7), ("try", 17), ("try", 23), ("try", 30)
-                     , ("try", 39), ("charge", 40), ("try", 50), ("try", 56), ("TimedOut 10.0", 60)
-                     ]
+  it "is kept by a mission that a monitor interrupts and that tries again after pauses, under random schedules"
+    . void . explore (randomly 300) $ \simulated -> do
+      low <- newTVarIO False
+      events <- newLog
+      let record what = now >>= \t -> note events (what, t)
+          charge = record "charge" >> sleep 10 >> atomically (writeTVar low False)
+          try' = record "try" >> sleep 100
+          drains = for_ [7, 40] (\t -> sleepUntil t >> atomically (writeTVar low True)) >> sleepForever
+          mission = do
+            end <- (+ 60) <$> now
+            Signal.monitor (Signal.watching (readTVar low)) charge
+              (timeoutAt end (retrying (iterate (* 2) 1) (timeout 5 try')))
+      _ <- simulated ((drains ||| mission) `fallbackWith` (record . show))
+      -- 5 s for each try, pauses of 1, 2, 4 and 8 s; after each charging from the beginning.
+      notes events
+        `shouldReturn` [ ("try", 0), ("try", 6), ("charge", 7), ("try", 17), ("try", 23), ("try", 30)
+                       , ("try", 39), ("charge", 40), ("try", 50), ("try", 56), ("TimedOut 10.0", 60)
+                       ]
 
   it "does not start a task again whose deadline passed while the robot recovered" $ do
     low <- newTVarIO True
     entries <- newLog
     let charge = sleep 10 >> atomically (writeTVar low False)
-    virtually (Signal.monitor (Signal.watching (readTVar low)) charge (timeoutAt 5 (note entries "task"))) `shouldThrow` (== TimedOut 0)
+    virtually (Signal.monitor (Signal.watching (readTVar low)) charge (timeoutAt 5 (note entries "task")))
+      `shouldThrow` (== TimedOut 0)
     notes entries `shouldReturn` []

@@ -42,8 +42,14 @@ spec = guarded $ do
         (found, all (== 7) found) `shouldSatisfy` \(these, right) -> not (null these) && right
 
   it "each operator that takes a behaviour" $ do
-    sources <- forM parts $ \part -> (,) (if part `elem` [".Signal", ".Trace"] then drop 1 part ++ "." else "") <$> readFile ("src/unliftio/" ++ pathOf ("Behavior.UnliftIO" ++ part))
-    let operators = [qualified ++ filter (`notElem` "()") name | (qualified, source) <- sources, name : "::" : _ <- map words (filter (isInfixOf "MonadUnliftIO") (lines source))]
+    let qualifier part = if part `elem` [".Signal", ".Trace"] then drop 1 part ++ "." else ""
+        source part = (,) (qualifier part) <$> readFile ("src/unliftio/" ++ pathOf ("Behavior.UnliftIO" ++ part))
+    sources <- forM parts source
+    let operators =
+          [ qualified ++ filter (`notElem` "()") name
+          | (qualified, code) <- sources
+          , name : "::" : _ <- map words (filter (isInfixOf "MonadUnliftIO") (lines code))
+          ]
     sort operators `shouldBe` sort (map fst places)
 
 -- | What follows @Behavior@ in the names of the modules.
@@ -62,8 +68,18 @@ places =
   , ("parallel", [(`parallel` sleepForever), parallel sleepForever])
   , ("|||", [(||| sleepForever), (sleepForever |||)])
   , ("both", [(`both` pure ()), both (pure ())])
-  , ("rSelect", [\act -> rSelect (True <$ act) (pure ()) failed, \act -> rSelect (pure True) act failed, rSelect (pure False) failed])
-  , ("monitor", [\act -> monitor (False <$ act) failed (pure ()), \act -> once (\var recovered -> monitor (atomically (readTVar var)) (act >> recovered) (pure ())), monitor (pure False) failed])
+  , ( "rSelect"
+    , [ \act -> rSelect (True <$ act) (pure ()) failed
+      , \act -> rSelect (pure True) act failed
+      , rSelect (pure False) failed
+      ]
+    )
+  , ( "monitor"
+    , [ \act -> monitor (False <$ act) failed (pure ())
+      , \act -> once (\var recovered -> monitor (atomically (readTVar var)) (act >> recovered) (pure ()))
+      , monitor (pure False) failed
+      ]
+    )
   , ("failingOn", [failingOn (== Fault "none")])
   , ("tryAny", [void . tryAny])
   , ("catchAny", [(`catchAny` const failed), catchAny failed . const])
@@ -78,7 +94,11 @@ places =
   , ("Signal.polling", [\act -> Signal.polling 0.001 (True <$ act) >>= Signal.waitUntil])
   , ("Signal.withShared", [Signal.withShared (pure ()) . const])
   , ("Signal.rSelect", [\act -> Signal.rSelect (pure True) act failed, Signal.rSelect (pure False) failed])
-  , ("Signal.monitor", [\act -> once (\var recovered -> Signal.monitor (Signal.watching (readTVar var)) (act >> recovered) (pure ())), Signal.monitor (pure False) failed])
+  , ( "Signal.monitor"
+    , [ \act -> once (\var recovered -> Signal.monitor (Signal.watching (readTVar var)) (act >> recovered) (pure ()))
+      , Signal.monitor (pure False) failed
+      ]
+    )
   , ("Signal.insteadWhen", [\act -> Signal.insteadWhen (pure True) act failed, Signal.insteadWhen (pure False) failed])
   , ("Signal.pausedWhile", [Signal.pausedWhile (pure False) failed failed, \act -> near act (pure ()), near (pure ())])
   , ("Signal.stoppedWhile", [Signal.stoppedWhile (pure False)])
@@ -93,11 +113,27 @@ places =
   , ("cleanupWithin", [void . cleanupWithin 3600])
   , ("abandoning", [abandoning 3600])
   , ("resumable", [\act -> newTVarIO "a" >>= \left -> resumable left (const act)])
-  , ("resumableFor", [\act -> newTVarIO empty >>= \progress -> resumableFor progress 'k' "a" (const act) >>= atomically])
+  , ( "resumableFor"
+    , [\act -> newTVarIO empty >>= \progress -> resumableFor progress 'k' "a" (const act) >>= atomically]
+    )
   , ("withTSem", [\act -> atomically (newTSem 1) >>= (`withTSem` act)])
-  , ("withInbox", [\act -> withInbox 1 (const (pure () <$ act)) (const (pure ())), \act -> withInbox 1 (const (pure act)) (const (pure ())), withMessage . const])
-  , ("onMessage", [\act -> withMessage (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure ())), \act -> withMessage (\inbox -> atomically (receive inbox) >> onMessage inbox (const failed) act)])
-  , ("messageRule", [\act -> withMessage (\inbox -> messageRule inbox (\() -> pure () <$ act) >>= \rule -> Signal.teleoReactive [rule, (pure True, pure ())])])
+  , ( "withInbox"
+    , [ \act -> withInbox 1 (const (pure () <$ act)) (const (pure ()))
+      , \act -> withInbox 1 (const (pure act)) (const (pure ()))
+      , withMessage . const
+      ]
+    )
+  , ( "onMessage"
+    , [ \act -> withMessage (\inbox -> onMessage inbox (\() -> pure () <$ act) (pure ()))
+      , \act -> withMessage (\inbox -> atomically (receive inbox) >> onMessage inbox (const failed) act)
+      ]
+    )
+  , ( "messageRule"
+    , [ \act -> withMessage $ \inbox ->
+          messageRule inbox (\() -> pure () <$ act) >>= \rule ->
+            Signal.teleoReactive [rule, (pure True, pure ())]
+      ]
+    )
   , ("handleNext", [\act -> withMessage (`handleNext` (\() -> pure () <$ act))])
   , ("Trace.named", [Trace.named "name"])
   , ("Trace.withTrace", [Trace.withTrace []])
@@ -112,7 +148,11 @@ places =
     var <- newTVarIO False
     paused <- newTVarIO False
     let become which = atomically (writeTVar which True)
-    Signal.pausedWhile (Signal.watching (readTVar var)) (pause >> become paused) resume (become var >> atomically (readTVar paused >>= check))
+    Signal.pausedWhile
+      (Signal.watching (readTVar var))
+      (pause >> become paused)
+      resume
+      (become var >> atomically (readTVar paused >>= check))
   withMessage = withInbox 1 (\deliver -> pure () <$ liftIO (deliver ()))
 
 -- | The file of a module.

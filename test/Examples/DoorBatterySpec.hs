@@ -109,7 +109,11 @@ endings =
   , (["--program", "4", "--front", "jammed:2"], TaskDone, ExitSuccess, "the task is done")
   , (sealed, RobotFailed, ExitFailure 1, "the robot failed at \"smash back door\": the back door is sealed")
   , (["--battery", "5", "--drain", "50", "--threshold", "0"], RanFlat, ExitFailure 3, "the battery is flat")
-  , (["--speed", "20", "--battery", "60", "--action", "20", "--drain", "0.5"], TaskDone, ExitSuccess, "the task is done")
+  , ( ["--speed", "20", "--battery", "60", "--action", "20", "--drain", "0.5"]
+    , TaskDone
+    , ExitSuccess
+    , "the task is done"
+    )
   ]
  where
   sealed = ["--front", "sealed", "--back", "sealed"]

@@ -44,7 +44,8 @@ spec = guarded $ do
  where
   worst = calm {windAt = 7, lowAt = 7, limit = 6, crashes = True}
   landingInFlight robot =
-    (motorsOn robot >> Signal.insteadWhen (strongWind robot) (land robot) (flight robot >> land robot)) `finally` motorsOff robot
+    (motorsOn robot >> Signal.insteadWhen (strongWind robot) (land robot) (flight robot >> land robot))
+      `finally` motorsOff robot
   stoppable robot = (motorsOn robot >> flight robot) `finally` (land robot >> motorsOff robot)
   landingAfterwards robot = do
     motorsOn robot
@@ -96,6 +97,9 @@ day setting end robot claim simulated = do
   ended run `shouldBe` end
   world `shouldRecord` exactly 1 (startOf "land") <> exactly 1 (successOf "land") <> exactly 1 (startOf "motors off")
   world `shouldRecord` successOf "land" `comesBefore` startOf "motors off"
-  world `shouldRecord` whenever (startOf "land") (never (anyOf (map startOf ["fly to", "film", "next path", "take off"])))
-  world `shouldRecord` never (running "land" `overlapping` running "fly to") <> never (running "land" `overlapping` running "film")
+  world
+    `shouldRecord` whenever (startOf "land") (never (anyOf (map startOf ["fly to", "film", "next path", "take off"])))
+  world
+    `shouldRecord` never (running "land" `overlapping` running "fly to")
+      <> never (running "land" `overlapping` running "film")
   world `shouldRecord` claim

@@ -25,7 +25,8 @@ spec = guarded $ do
   it "hands over each order once, and frees each charger, on its worst day" $
     survives 300 (day worst "returned" once fleet)
   it "fails when no robot is left, and keeps the orders" $
-    survives 100 (day [quiet "Bo" [5], quiet "Ed" [5]] "failure: FailedBecause \"no robot is left\"" (never (successOf "hand over")) fleet)
+    let day' = day [quiet "Bo" [5], quiet "Ed" [5]] "failure: FailedBecause \"no robot is left\""
+     in survives 100 (day' (never (successOf "hand over")) fleet)
   it "and robots that take an order and then protect it lose one" $
     failsWith "It was so 0 times" 200 (day worst "returned" once (each takeThenProtect))
   it "and robots that can be interrupted as they hand over an order do it twice" $
@@ -49,7 +50,8 @@ data Story = Story
   }
 
 quiet :: String -> [Seconds] -> Story
-quiet called gone = Story {who = called, lowAt = [], withdrawnAt = gone, carrying = succeeds `taking` 3, charging = succeeds `taking` 2}
+quiet called gone =
+  Story {who = called, lowAt = [], withdrawnAt = gone, carrying = succeeds `taking` 3, charging = succeeds `taking` 2}
 
 -- | The orders come after 5 seconds, and the first ones are handed over after 8. In the end Ann is
 -- the only one that works, and her battery becomes low each time when she hands over an order.
@@ -68,7 +70,8 @@ day stories end claim serve simulated = do
   newOrders <- driver world "orders" [(5, order) | order <- [1 .. 6]]
   free <- atomically (newTSem 1)
   done <- newTVarIO (0 :: Int)
-  carries <- actionOn world "carry" $ \(called, _order :: Order) -> [carrying s `slowToStop` 0.5 | s <- stories, who s == called]
+  carries <- actionOn world "carry" $ \(called, _order :: Order) ->
+    [carrying s `slowToStop` 0.5 | s <- stories, who s == called]
   hands <- actionOn world "hand over" (const [succeeds `causing` atomically (modifyTVar' done (+ 1))])
   charges <- actionOn world "charge" $ \called -> [charging s | s <- stories, who s == called]
   let robot story = do

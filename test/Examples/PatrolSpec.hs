@@ -76,7 +76,9 @@ places = ["A", "B", "C"]
 -- | No waypoint is skipped; and after its report the robot does not drive to a waypoint before it
 -- has reported the next one.
 inOrder :: Claim
-inOrder = foldMap (comesBefore (successOf (reportOf "A")) . successOf . reportOf) ["B", "C"] <> foldMap next (zip places (drop 1 (cycle places)))
+inOrder =
+  foldMap (comesBefore (successOf (reportOf "A")) . successOf . reportOf) ["B", "C"]
+    <> foldMap next (zip places (drop 1 (cycle places)))
  where
   next (this, following) =
     whenever (successOf (reportOf this)) $

@@ -23,7 +23,8 @@ spec = guarded $ do
   it "gives up when the part has slipped twice" $
     inOneRun (day [3, 7] 60 (exactly 2 (startOf "move to Box") <> never (successOf "move to Box")) pickAndPlace)
   it "takes a position on which two of three detectors agree" $ do
-    let located found = fmap ended . simulate $ locate found >>= \position -> when (position /= 2.5) (failWith (show position))
+    let located found =
+          fmap ended . simulate $ locate found >>= \position -> when (position /= 2.5) (failWith (show position))
     located [pure 2, Time.sleep 1 >> pure 3, Time.sleep 3600 >> pure 2] `shouldReturn` "returned"
     located [pure 7, failWith "dark", pure 2] `shouldReturn` "failure: FailedBecause \"no 2 of 3 agree\""
   it "never moves while the gripper moves, and ends parked, whenever it is cancelled" $
@@ -48,7 +49,8 @@ day slips cancelledAt claim robot simulated = do
   world <- newMock
   held <- condition world "holding" ((0, False) : [(t, False) | t <- slips])
   move <- actionOn world "move to" $ \place -> [succeeds `taking` (if place == Box then 2 else 0.5) `slowToStop` 0.5]
-  grips <- actionOn world "gripper" $ \to -> [succeeds `taking` 0.25 `causing` set held (to == Closed) `slowToStop` 0.125]
+  grips <- actionOn world "gripper" $ \to ->
+    [succeeds `taking` 0.25 `causing` set held (to == Closed) `slowToStop` 0.125]
   parks <- action world "park" [succeeds `taking` 1]
   first <- action world "camera" [returning 2]
   third <- action world "laser" [returning 2.5 `taking` 0.5]

@@ -49,17 +49,18 @@ spec = guarded $ do
 reactiveSelection :: Spec
 reactiveSelection = do
   describe "Paper.NestedSelection" $ do
-    for_ [(one, two, three) | one <- [False, True], two <- [False, True], three <- [False, True]] $ \(one, two, three) -> do
-      let chosen
-            | one = if three then "a5" else "a4"
-            | otherwise = if two then "a2" else "a1"
-      it ("does " ++ chosen ++ " when c1, c2, c3 are " ++ show (one, two, three)) $
-        playingIn still [] (\world -> do
-          (C1 `becomes` one) world
-          (C2 `becomes` two) world
-          (C3 `becomes` three) world
-          NestedSelection.bt)
-          `shouldReturn` (Gave (), [Did chosen])
+    for_ [(one, two, three) | one <- [False, True], two <- [False, True], three <- [False, True]] $
+      \(one, two, three) -> do
+        let chosen
+              | one = if three then "a5" else "a4"
+              | otherwise = if two then "a2" else "a1"
+        it ("does " ++ chosen ++ " when c1, c2, c3 are " ++ show (one, two, three)) $
+          playingIn still [] (\world -> do
+            (C1 `becomes` one) world
+            (C2 `becomes` two) world
+            (C3 `becomes` three) world
+            NestedSelection.bt)
+            `shouldReturn` (Gave (), [Did chosen])
     it "switches inside a selection, and from one to the other" $
       playing
         still

@@ -45,7 +45,19 @@ data Level
   | ByNeighbour
   deriving (Eq, Show)
 
-data Place = InParallel | InBoth | InFirst | InAll | InDecision | InSelect | InTask | InHolding | InTimeout | InAttempt | InFailing | InScope
+data Place
+  = InParallel
+  | InBoth
+  | InFirst
+  | InAll
+  | InDecision
+  | InSelect
+  | InTask
+  | InHolding
+  | InTimeout
+  | InAttempt
+  | InFailing
+  | InScope
   deriving (Bounded, Enum, Eq, Show)
 
 levels :: Size -> Gen Levels
@@ -91,7 +103,12 @@ stoppedAtItsOwnLevel stage l (Levels these) = do
         ByTimeout n -> L.fallback l (L.timeout l (fromIntegral n * tick stage) act) (pure ())
       whole
         | stops = calling stage pure [] (build 0 these)
-        | otherwise = calling stage (\() -> atomically (readTVar inside >>= check)) [(0, Changes ()), (0, CancelsCaller)] (build 0 these)
+        | otherwise =
+            calling
+              stage
+              (\() -> atomically (readTVar inside >>= check))
+              [(0, Changes ()), (0, CancelsCaller)]
+              (build 0 these)
   end <- run stage whole
   done <- readLog continued
   let level = length (takeWhile (not . isStop) these)
@@ -128,8 +145,12 @@ data Cause = ByCaller | ByFailure
 
 groups :: Size -> Gen Group
 groups size = do
-  composition <- elements ([AsFirst, AsDecision, AsAll, AsPair, AsRace] ++ [w | size == Full, w <- [AsForks, AsTaskAndSensor]])
-  n <- if size == Full && composition `elem` [AsFirst, AsDecision, AsAll, AsForks] then choose (2, 3) else pure (2 :: Int)
+  composition <-
+    elements ([AsFirst, AsDecision, AsAll, AsPair, AsRace] ++ [w | size == Full, w <- [AsForks, AsTaskAndSensor]])
+  n <-
+    if size == Full && composition `elem` [AsFirst, AsDecision, AsAll, AsForks]
+      then choose (2, 3)
+      else pure (2 :: Int)
   -- Two uninterruptible ones would wait for each other.
   uninterruptibleOne <- choose (0, 2 * n)
   cause <- if composition == AsTaskAndSensor || size == Tiny then pure ByCaller else elements [ByCaller, ByFailure]

@@ -53,7 +53,8 @@ satisfies clause stage' language' (Program tree stimuli state) = do
         before <- liveThreadCount
         end <- try (inState state (toBehavior context tree))
         after <- liveThreadCount
-        unless (before == after) $ recordViolation context Structure (show (after - before) ++ " threads were left running")
+        unless (before == after) $
+          recordViolation context Structure (show (after - before) ++ " threads were left running")
         case end of
           Left e | cancelledBy (endingOf (end :: Either SomeException Int)) -> throwIO e
           -- A caller that is to be cancelled waits for that. If its cancellation was lost, it
@@ -63,7 +64,8 @@ satisfies clause stage' language' (Program tree stimuli state) = do
   end <- run stage' (if clause == Labels then watchingThreads (labelling context) whole else whole)
   case end of
     Gave outcome
-      | cancelledBy outcome, not (any (stopsCaller . snd) stimuli) -> broken ("an outcome of a cancellation that was not sent: " ++ show outcome)
+      | cancelledBy outcome, not (any (stopsCaller . snd) stimuli) ->
+          broken ("an outcome of a cancellation that was not sent: " ++ show outcome)
     Gave _ -> pure ()
     other -> broken ("the test's own thread ended: " ++ show other)
   found <- readLog (recordedViolations context)
@@ -75,7 +77,8 @@ satisfies clause stage' language' (Program tree stimuli state) = do
     MaskedInterruptible -> mask_
     MaskedUninterruptible -> uninterruptibleMask_
   labelling context = \case
-    Started label -> myThreadId >>= \self -> atomicModifyIORef' (threadLabels context) (\m -> (Map.insert self label m, ()))
+    Started label ->
+      myThreadId >>= \self -> atomicModifyIORef' (threadLabels context) (\m -> (Map.insert self label m, ()))
     _ -> pure ()
 
 cancelledBy :: Ending a -> Bool
@@ -126,7 +129,8 @@ toBehavior t = \case
         count k = atomicModifyIORef' live (\n -> (n + k, ()))
         chosen = do
           n <- readIORef live
-          unless (n == 0) $ recordViolation t Structure ("what decide has chosen runs, but " ++ show n ++ " branches have not ended")
+          unless (n == 0) $
+            recordViolation t Structure ("what decide has chosen runs, but " ++ show n ++ " branches have not ended")
     L.decide l (atLeast m chosen) [counted (branch n (show n) a) | (n, a) <- zip [1 ..] as]
   Beside as b -> observed t "scoped" Concurrent [] $ \branch ->
     L.beside l [void (branch n "fork" a) | (n, a) <- zip [2 ..] as] (branch 1 "body" b)
@@ -171,7 +175,8 @@ observed t operator kind ownFailures body = mask $ \restore -> do
   o <- Observed <$> newIORef 0 <*> newIORef []
   end <- try (restore (body (branching t operator kind o)))
   n <- readIORef (running o)
-  unless (n == 0) $ recordViolation t Structure (operator ++ " has ended, but " ++ show n ++ " of its branches have not")
+  unless (n == 0) $
+    recordViolation t Structure (operator ++ " has ended, but " ++ show n ++ " of its branches have not")
   started <- reverse . map snd <$> readIORef (entries o)
   contract t operator kind ownFailures (endingOf end) started
   either (\e -> throwIO (e :: SomeException)) (pure . abs) end
@@ -183,15 +188,18 @@ branching t operator kind o place name tree = do
   mask $ \restore -> do
     unless (state == Unmasked) $ recordViolation t Masking (expected ++ " runs " ++ show state)
     self <- Map.lookup <$> myThreadId <*> readIORef (threadLabels t)
-    unless (self == Just (Label operator name)) $ recordViolation t Labels (expected ++ " runs in a thread that is labelled " ++ show self)
+    unless (self == Just (Label operator name)) $
+      recordViolation t Labels (expected ++ " runs in a thread that is labelled " ++ show self)
     others <- atomicModifyIORef' (running o) (\n -> (n + 1, n))
-    when (kind == Reactive && others > 0) $ recordViolation t Exclusion (expected ++ " started although another branch runs")
+    when (kind == Reactive && others > 0) $
+      recordViolation t Exclusion (expected ++ " started although another branch runs")
     before <- readIORef (entries o)
     when (kind == Reactive && any (completedDespiteStop . snd) before) $
       recordViolation t Work (expected ++ " started although a branch had completed")
     key <- atomicModifyIORef' (entries o) (\es -> ((length es, Entry place Nothing) : es, length es))
     end <- try (restore (toBehavior t tree))
-    atomicModifyIORef' (entries o) (\es -> ([(k, if k == key then Entry place (Just (endingOf end)) else e) | (k, e) <- es], ()))
+    let ended' = Entry place (Just (endingOf end))
+    atomicModifyIORef' (entries o) (\es -> ([(k, if k == key then ended' else e) | (k, e) <- es], ()))
     atomicModifyIORef' (running o) (\n -> (n - 1, ()))
     either (\e -> throwIO (e :: SomeException)) pure end
  where
@@ -223,7 +231,9 @@ contract t operator kind ownFailures end started = do
     _ -> pure ()
   when (operator == "both" && gave && length results /= 2) $ wrong Outcomes "not both have completed"
   case [n | kind == Reactive, Gave n <- outcomes, n < 0] of
-    n : _ | null faults, not (cancelledBy end), not (gave && valueIs n) -> wrong Work ("a branch completed with " ++ show (abs n))
+    n : _
+      | null faults, not (cancelledBy end), not (gave && valueIs n) ->
+          wrong Work ("a branch completed with " ++ show (abs n))
     _ -> pure ()
  where
   wrong clause why = recordViolation t clause (operator ++ " ended: " ++ show end ++ ", but " ++ why)

@@ -110,7 +110,9 @@ end (Scope flaw _ branches) = do
     Just ReturnsBeforeTheLoser -> [] <$ requestStopAsync started
     Just StopsOneByOne -> concat <$> for started (\b -> requestStop [b] >> waitUninterruptibly b)
     Just OrphansAtSecondCancel -> requestStop started >> concat <$> traverse wait started
-    Just RequestsStopTwice -> requestStop started >> concat <$> for started (\b -> wait b `onInterruption` (requestStopByHelper b >> waitUninterruptibly b))
+    Just RequestsStopTwice ->
+      requestStop started
+        >> concat <$> for started (\b -> wait b `onInterruption` (requestStopByHelper b >> waitUninterruptibly b))
     Just DropsTheLosersFault -> do
       requestStop started
       byThemselves <- filterM (\(SomeBranch (Branch _ requested _)) -> not <$> readIORef requested) started

@@ -43,7 +43,8 @@ copied flaw =
     , rSelect = \condition left right ->
         react flaw "rSelect" (possiblyFlawed condition) (\c -> if c then Run "left" left else Run "right" right)
     , monitor = \condition recovery task ->
-        react flaw "monitor" (possiblyFlawed condition) (\c -> if c then RunToEnd "recovery" recovery else Run "task" task)
+        react flaw "monitor" (possiblyFlawed condition) $ \c ->
+          if c then RunToEnd "recovery" recovery else Run "task" task
     , whileHolding = \condition act ->
         react flaw "whileHolding" (possiblyFlawed condition) $ \c ->
           if c then Run "branch" act else Conclude (failWith "the condition does not hold")
@@ -54,7 +55,8 @@ copied flaw =
   numbers = map show [1 :: Int ..]
   possiblyFlawed (Signal opening)
     | flaw == Just TakesDeadForFalse =
-        Signal (fmap (\source -> source {view = mapView (`catchSTM` \(_ :: SomeException) -> pure False) <$> view source}) . opening)
+        let orFalse = (`catchSTM` \(_ :: SomeException) -> pure False)
+         in Signal (fmap (\source -> source {view = mapView orFalse <$> view source}) . opening)
     | otherwise = Signal opening
 
 -- * Concurrent
@@ -134,14 +136,16 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         choose sensors seen how
 
       choose :: [Branch ()] -> View k -> ReadMode -> IO (IO a)
-      choose sensors seen how = tryAtomically (readView how seen) >>= either (pure . throwIO) (applyReaction sensors seen)
+      choose sensors seen how =
+        tryAtomically (readView how seen) >>= either (pure . throwIO) (applyReaction sensors seen)
 
       applyReaction sensors seen old = case reaction old of
         Conclude verdict -> pure verdict
         RunToEnd name recovery -> requestStop (map SomeBranch sensors) >> recover sensors seen name recovery Nothing
         Run name act -> do
           running <- branch scope name act
-          event <- tryAtomically ((Right <$> outcomeOf running) `orElse` (Left <$> (reread seen >>= \new -> check (new /= old) >> pure new)))
+          let changed = reread seen >>= \new -> check (new /= old) >> pure new
+          event <- tryAtomically ((Right <$> outcomeOf running) `orElse` (Left <$> changed))
           case event of
             Right (Right outcome) -> pure (outcomeToIO outcome)
             Right (Left new) -> stopAndNext sensors seen new running (reaction new)
@@ -183,7 +187,9 @@ react flaw operator signal reaction = structured flaw operator $ \scope -> do
         recovered <- branch scope name recovery
         outcome <-
           if flaw == Just WatchesDuringTheRecovery
-            then tryAtomically ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ (reread seen >>= \now' -> check (unwanted now'))))
+            then
+              let isUnwanted = reread seen >>= \now' -> check (unwanted now')
+               in tryAtomically ((Just <$> outcomeOf recovered) `orElse` (Nothing <$ isUnwanted))
             else Right . Just <$> atomically (outcomeOf recovered)
         case (outcome, taskVerdict) of
           (Right (Just (Done (Right ()))), Nothing) -> awaitStopped sensors >> begin Reread
@@ -213,7 +219,8 @@ timeoutWith flaw seconds act
   | otherwise = do
       over <- newTVarIO False
       let clock = sleep seconds >> atomically (writeTVar over True)
-          elapsed = Signal (\_ -> pure (fromView (pure (constantView (readTVar over)))) {workers = [Worker "clock" (pure (const clock))]})
+          isOver = fromView (pure (constantView (readTVar over)))
+          elapsed = Signal (\_ -> pure isOver {workers = [Worker "clock" (pure (const clock))]})
       react flaw "timeout" elapsed (\up -> if up then Conclude (throwIO (TimedOut seconds)) else Run "branch" act)
 
 -- * Sensors
@@ -237,7 +244,8 @@ pollingWith flaw every act = Signal $ \_ -> do
           else atomically (writeTVar newest (Just (k, read')))
       prepareReadings = do
         unless (flaw /= Just ForgetsThePeriod) (writeTVar nextSlot Nothing)
-        pure (\stopRequested -> readRepeatedly stopRequested `catch` \e -> if e == ThreadKilled then pure () else throwIO e)
+        pure $ \stopRequested ->
+          readRepeatedly stopRequested `catch` \e -> if e == ThreadKilled then pure () else throwIO e
       seen = do
         before <- readTVar started
         pure . constantView $

@@ -57,7 +57,10 @@ data Cause = Failing | Faulting | LosingValue
 
 sensorFailures :: Size -> Gen SensorFailure
 sensorFailures size = do
-  sensor <- if size == Tiny then pure WatchedSensor else frequency [(1, pure WatchedSensor), (2, PolledSensor <$> choose (1, 2))]
+  sensor <-
+    if size == Tiny
+      then pure WatchedSensor
+      else frequency [(1, pure WatchedSensor), (2, PolledSensor <$> choose (1, 2))]
   fromTheStart <- frequency [(4, pure False), (1, pure True)]
   cause <- elements ([Failing, Faulting] ++ [LosingValue | sensor == WatchedSensor, not fromTheStart])
   operator <- elements [Selecting False, Selecting True, Monitoring, Holding]
@@ -83,7 +86,9 @@ notTakenForFalse stage l (SensorFailure operator sensor cause fromTheStart act) 
       signal = case sensor of
         WatchedSensor -> watching reading
         PolledSensor n -> L.polling l (fromIntegral n * tick stage) (atomically reading)
-      branch = perform stage (atomically (writeTVar inside True)) (pure ()) act {takes = untilStopped, uninterruptible = False}
+      branch =
+        perform stage (atomically (writeTVar inside True)) (pure ()) act
+          {takes = untilStopped, uninterruptible = False}
       other = 0 <$ append others ()
       operating = case operator of
         Selecting True -> L.rSelect l signal branch other
@@ -148,7 +153,10 @@ aPeriodApart stage l (Script operator every values) = do
       for_ (zip [0 :: Int ..] moments) $ \(k, moment) ->
         -- A period is a sum of fractions, each rounded.
         when (moment - t < fromIntegral k * apart - 1e-9) $
-          broken ("reading " ++ show (k + 1) ++ " began " ++ show (moment - t) ++ " after the start, and the period is " ++ show apart)
+          broken
+            ( "reading " ++ show (k + 1) ++ " began " ++ show (moment - t)
+                ++ " after the start, and the period is " ++ show apart
+            )
       case ended of
         Gave () -> pure ()
         FailedWith _ | operator == Holding, or values -> pure ()
@@ -175,11 +183,13 @@ data Mission = Mission
 missions :: Size -> Gen Mission
 missions size = do
   n <- choose (1, if size == Tiny then 1 else 3 :: Int)
+  let values k = choose (0, 2) >>= \m -> (++ [k < n]) <$> vectorOf m (elements [False, True])
+      aRound k = (,) <$> choose (0, 2) <*> values k
   Mission
     <$> elements [False, True]
     <*> elements [False, True]
     <*> acts 5
-    <*> traverse (\k -> (,) <$> choose (0, 2) <*> ((++ [k < n]) <$> (choose (0, 2) >>= \m -> vectorOf m (elements [False, True])))) [1 .. n]
+    <*> traverse aRound [1 .. n]
     <*> frequency [(4, pure Succeeds), (1, ends)]
 
 data Milestone = TaskStarts | TaskStopRequested | RecoveryStarts | RecoveryEnds | RecoveryStopRequested
@@ -260,7 +270,9 @@ toggles size =
   Toggles
     <$> (if size == Tiny then pure WatchedSensor else elements [WatchedSensor, PolledSensor 1, PolledSensor 2])
     <*> elements [False, True]
-    <*> (choose (1, if size == Tiny then 1 else 3) >>= \n -> vectorOf n ((,) <$> choose (0, 2) <*> elements [False, True]))
+    <*> (choose (1, if size == Tiny then 1 else 3) >>= \n -> vectorOf n change)
+ where
+  change = (,) <$> choose (0, 2) <*> elements [False, True]
 
 -- | The next branch is chosen by the condition's value at the end of the branch before.
 readAgain :: Stage -> Language -> Toggles -> IO ()

@@ -58,7 +58,9 @@ programsOf root size = case size of
   states = frequency [(4, pure Unmasked), (1, pure MaskedInterruptible), (1, pure MaskedUninterruptible)]
   stimuli = do
     changes <- choose someChanges >>= \n -> vectorOf n (Changes <$> choose (0, 3))
-    cancels <- frequency [(1, pure 0), (3, pure 1), (2, pure 2)] >>= \n -> vectorOf n (frequency [(2, pure CancelsCaller), (1, pure ThrowsAtCaller)])
+    cancels <-
+      frequency [(1, pure 0), (3, pure 1), (2, pure 2)] >>= \n ->
+        vectorOf n (frequency [(2, pure CancelsCaller), (1, pure ThrowsAtCaller)])
     order <- shuffle (changes ++ cancels)
     traverse (\stimulus -> (\after -> (after, stimulus)) <$> choose (0, 2)) order
 

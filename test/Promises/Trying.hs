@@ -78,7 +78,8 @@ tried program how keeping =
     Left counterexample -> broken ("of this program:\n" ++ program ++ "\n" ++ show counterexample)
     Right report
       | reportComplete report -> pure (Tried 1 (reportSchedules report) (reportPoints report))
-      | otherwise -> broken ("there are more than " ++ show (reportSchedules report) ++ " schedules of this program:\n" ++ program)
+      | otherwise ->
+          broken ("there are more than " ++ show (reportSchedules report) ++ " schedules of this program:\n" ++ program)
 
 -- | Limits that no program comes near.
 limits :: SimOptions
@@ -104,7 +105,8 @@ inReality :: Int -> Int -> Language -> Promise -> IO ()
 inReality from n language (Promise _ itsSalt gen keeping) =
   forM_ (take n [from ..]) $ \i -> do
     let program = programFrom (gen Full) (seedOf itsSalt i)
-    within 20 (keeping real language program) `catch` \(Broken how) -> broken ("of this program:\n" ++ show program ++ "\n" ++ how)
+    within 20 (keeping real language program) `catch` \(Broken how) ->
+      broken ("of this program:\n" ++ show program ++ "\n" ++ how)
 
 real :: Stage
 real =

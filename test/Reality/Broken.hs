@@ -37,7 +37,9 @@ lately s uninterruptible =
     , send = \target e -> do
         waits <- Set.member target <$> readTVarIO uninterruptible
         if waits
-          then void (spawn s (Label "interrupt" "helper") (\_ _ -> thatEnds (uninterruptibleMask_ (throws target e))) pure)
+          then
+            let interruption = thatEnds (uninterruptibleMask_ (throws target e))
+             in void (spawn s (Label "interrupt" "helper") (\_ _ -> interruption) pure)
           else send s target e
     , transact = after . transact s
     , clock = after (clock s)

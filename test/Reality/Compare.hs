@@ -16,7 +16,8 @@ module Reality.Compare
   ) where
 
 import Control.Concurrent (yield)
-import Control.Exception (Exception (..), asyncExceptionFromException, asyncExceptionToException, evaluate, throwIO, try)
+import Control.Exception
+  (Exception (..), asyncExceptionFromException, asyncExceptionToException, evaluate, throwIO, try)
 import Control.Monad (void)
 import Data.IORef
 import Data.Set (Set)

@@ -135,7 +135,8 @@ unmasking :: [Fixed]
 unmasking =
   [ Fixed "is raised at the unmask, though nothing follows" "threw a" $ pending const
   , Fixed "is raised at the unmask, and no result is returned" "threw a" $ pending (\waits _ -> "done" <$ waits)
-  , Fixed "is raised at the unmask, before a checkpoint" "threw a" $ pending (\waits _ -> waits >> checkpoint >> pure "done")
+  , Fixed "is raised at the unmask, before a checkpoint" "threw a" $
+      pending (\waits _ -> waits >> checkpoint >> pure "done")
   , Fixed "is raised at the unmask, before the clock is read" "threw a" $ pending (\waits _ -> waits >> now)
   , Fixed "is raised at the unmask, before a transaction" "threw a" $ pending (\waits record -> waits >> record "1")
   , Fixed "is raised at the end of the outermost mask" "1 threw a" $
@@ -144,7 +145,8 @@ unmasking =
       pending (\waits record -> waits `catch` \(Cancel _) -> record "1")
   , Fixed "is not raised inside of a handler that was installed in the mask" "threw a" $
       pending (\waits record -> mask_ (waits `catch` \(Cancel _) -> record "1"))
-  , Fixed "runs a cleanup that was installed outside of the mask" "1 threw a" $ pending (\waits record -> waits `finally` record "1")
+  , Fixed "runs a cleanup that was installed outside of the mask" "1 threw a" $
+      pending (\waits record -> waits `finally` record "1")
   , Fixed "does not run a cleanup that was installed in the mask" "threw a" $
       pending (\waits record -> mask_ (waits `onException` record "1"))
   , Fixed "is raised at restore" "1 threw a" $
@@ -156,10 +158,12 @@ unmasking =
   , Fixed "is not raised at restore of an inner mask" "1 2 threw a" $
       pending (\waits record -> mask_ (mask (\restore -> waits >> record "1" >> restore (pure ()) >> record "2")))
   , Fixed "is raised at restore of an uninterruptible mask" "1 threw a" $
-      pending (\waits record -> uninterruptibleMask (\restore -> waits >> record "1" >> restore (pure ()) >> record "2"))
+      pending
+        (\waits record -> uninterruptibleMask (\restore -> waits >> record "1" >> restore (pure ()) >> record "2"))
   , Fixed "is raised at restore of an uninterruptible mask in a mask only where the target blocks" "1 2 threw a" $
       pending $ \waits record ->
-        mask_ $ uninterruptibleMask $ \restore -> waits >> restore (record "1") >> record "2" >> restore hang >> record "3"
+        mask_ $ uninterruptibleMask $ \restore ->
+          waits >> restore (record "1") >> record "2" >> restore hang >> record "3"
   , Fixed "is raised by allowInterrupt" "1 threw a" $
       pending (\waits record -> mask_ (waits >> record "1" >> allowInterrupt >> record "2"))
   , Fixed "is not raised by allowInterrupt in an uninterruptible mask" "1 2 threw a" $
@@ -238,7 +242,10 @@ handlers =
   , Fixed "does not interrupt a cleanup that need not block" "1 2 threw a" $ do
       gate <- newGate
       logged <- newLog
-      t <- thread "target" (hang `finally` (note logged "1" >> uninterruptibleMask_ (pass gate) >> note logged "2") :: IO ())
+      t <-
+        thread
+          "target"
+          (hang `finally` (note logged "1" >> uninterruptibleMask_ (pass gate) >> note logged "2") :: IO ())
       a <- throwsTo t "a"
       b <- throwsTo t "b"
       open gate
@@ -340,7 +347,8 @@ operators =
   , Fixed "like ? does not run the second behaviour when the first failed in a mask" "threw a" $
       pending (\waits record -> mask_ (waits >> failWith "no") ? record "1")
   , Fixed "that has requested the stop of its branch stops it at the branch's unmask" "stopped" $ stopRequested pure
-  , Fixed "that has requested the stop of its branch stops it before a checkpoint" "stopped" $ stopRequested (<$ checkpoint)
+  , Fixed "that has requested the stop of its branch stops it before a checkpoint" "stopped" $
+      stopRequested (<$ checkpoint)
   , Fixed "that has requested the stop of its branch stops it at restore" "stopped" $
       stopRequested (\a -> a <$ mask (\restore -> restore checkpoint))
   , Fixed "like parallel stops the loser at its unmask" "()" $ do

@@ -50,7 +50,8 @@ operator n =
       , wrapping (Then (Close 0) <$> step)
       ]
   -- Changes the condition; most of these then wait, so that the other branch ends first.
-  changing = frequency [(3, pure (Open 0 `Then` Await 1)), (1, pure (Open 0 `Then` (Close 0 `Then` Await 1))), (1, step)]
+  changing =
+    frequency [(3, pure (Open 0 `Then` Await 1)), (1, pure (Open 0 `Then` (Close 0 `Then` Await 1))), (1, step)]
 
 -- | What a branch does.
 work :: Gen Program

@@ -41,30 +41,33 @@ spec = specWith (Effort 100 200 1 25 1000 200 1)
 
 specWith :: Effort -> Spec
 specWith effort = do
-  describe "An outcome that GHC determines is the same on real threads and in the simulation:" . around_ (within 60 . leavingNothing) $
-    for_ table $ \(group, programs) -> describe group $
-      for_ programs $ \fixed ->
-        it (title fixed) $ do
-          realOutcomes (realRuns effort) (program fixed) `shouldReturn` Set.singleton (expected fixed)
-          simulatedOutcomes 2 (program fixed) `shouldReturn` Set.singleton (expected fixed)
-          randomOutcomes (randomSchedules effort) (program fixed) `shouldReturn` Set.singleton (expected fixed)
+  describe "An outcome that GHC determines is the same on real threads and in the simulation:"
+    . around_ (within 60 . leavingNothing) $
+      for_ table $ \(group, programs) -> describe group $
+        for_ programs $ \fixed ->
+          it (title fixed) $ do
+            realOutcomes (realRuns effort) (program fixed) `shouldReturn` Set.singleton (expected fixed)
+            simulatedOutcomes 2 (program fixed) `shouldReturn` Set.singleton (expected fixed)
+            randomOutcomes (randomSchedules effort) (program fixed) `shouldReturn` Set.singleton (expected fixed)
   total <- runIO (newIORef mempty)
   let counted = readIORef total >>= \t -> putStrLn ("    (seed " ++ show (seed effort) ++ ": " ++ show t ++ ")")
-  afterAll_ counted . describe "A real run of a random program" . around_ (within (60 * minutes effort) . leavingNothing) $
-    it "has an outcome that is also simulated" $ do
-      wrong <- newIORef []
-      compareMany id (seed effort) (limit effort) (randomPrograms effort) (realRunsOfEach effort) $ \c -> do
-        modifyIORef' total (<> figures c)
-        if Set.null (onlyInReality c) then pure () else modifyIORef' wrong (c :)
-      readIORef wrong >>= \them -> map show them `shouldBe` []
-      (several, count) <- programsWithSeveral <$> readIORef total
-      2 * several `shouldSatisfy` (>= count)
-  describe "A masked branch that was woken by another capability, and has not run since," . around_ (within 60 . leavingNothing) $
-    it "can be stopped, in reality and in the simulation" $ do
-      outcomes <- inReality (seed effort) 1000 woken
-      Just (_, right) <- explored id 10000 woken
-      right `shouldBe` Set.fromList [": Gave 'p'", "a: Gave 'p'"]
-      Set.difference outcomes right `shouldBe` Set.empty
+  afterAll_ counted . describe "A real run of a random program"
+    . around_ (within (60 * minutes effort) . leavingNothing) $
+      it "has an outcome that is also simulated" $ do
+        wrong <- newIORef []
+        compareMany id (seed effort) (limit effort) (randomPrograms effort) (realRunsOfEach effort) $ \c -> do
+          modifyIORef' total (<> figures c)
+          if Set.null (onlyInReality c) then pure () else modifyIORef' wrong (c :)
+        readIORef wrong >>= \them -> map show them `shouldBe` []
+        (several, count) <- programsWithSeveral <$> readIORef total
+        2 * several `shouldSatisfy` (>= count)
+  describe "A masked branch that was woken by another capability, and has not run since,"
+    . around_ (within 60 . leavingNothing) $
+      it "can be stopped, in reality and in the simulation" $ do
+        outcomes <- inReality (seed effort) 1000 woken
+        Just (_, right) <- explored id 10000 woken
+        right `shouldBe` Set.fromList [": Gave 'p'", "a: Gave 'p'"]
+        Set.difference outcomes right `shouldBe` Set.empty
   describe "A simulator that raises exceptions too late is detected" . around_ (within 60 . leavingNothing) $ do
     it "by an outcome that GHC determines" $ do
       let differs fixed = (/= Set.singleton (expected fixed)) <$> randomOutcomes 50 (late (program fixed))

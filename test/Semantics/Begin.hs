@@ -37,7 +37,15 @@ initial world =
           Called NoRequest (Starting (program world)) (changes world) [cancelAt world, cancelAt world + later]
     }
  where
-  start = Now {clock = 0, levels = Map.fromList (conditions world), calls = Map.empty, shared = [], childResults = Map.empty, childStopRequests = Set.empty}
+  start =
+    Now
+      { clock = 0
+      , levels = Map.fromList (conditions world)
+      , calls = Map.empty
+      , shared = []
+      , childResults = Map.empty
+      , childStopRequests = Set.empty
+      }
 
 -- | The state of a program that is about to run.
 begin :: Now -> Program -> Running

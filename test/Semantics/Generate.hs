@@ -62,7 +62,10 @@ within' inScope sharing = go
       , (1, Pure . Number <$> choose (0, 2))
       , (1, WaitUntil <$> signal 0)
       ]
-        ++ (if inScope then [(8, Fork <$> action), (4, Await <$> action <*> action), (2, StopChild <$> action <*> action)] else [])
+        ++ [ choice
+           | inScope
+           , choice <- [(8, Fork <$> action), (4, Await <$> action <*> action), (2, StopChild <$> action <*> action)]
+           ]
   go n =
     frequency $
       [ (1, go 0)
@@ -86,7 +89,10 @@ within' inScope sharing = go
       , (2, Scoped <$> within' True sharing (n - 1))
       , (2, WithShared <$> sensed <*> within' False True (n - 1))
       ]
-        ++ (if inScope then [(3, Fork <$> less), (3, Await <$> less <*> less), (2, StopChild <$> less <*> less)] else [])
+        ++ [ choice
+           | inScope
+           , choice <- [(3, Fork <$> less), (3, Await <$> less <*> less), (2, StopChild <$> less <*> less)]
+           ]
    where
     less = frequency [(1, choose (0, n - 1)), (2, pure (n - 1))] >>= go
     sensed = signal (n - 1)

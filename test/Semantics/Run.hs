@@ -131,7 +131,8 @@ operatorName = \case
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
-  report <- explore (exhaustively preemptions) {planSearch = Exhaustive preemptions most, planOptions = limits world} $ \simulated ->
+  let all' = (exhaustively preemptions) {planSearch = Exhaustive preemptions most, planOptions = limits world}
+  report <- explore all' $ \simulated ->
     observing plain simulated world >>= \(seen, _) -> modifyIORef' found (Set.insert seen)
   found' <- readIORef found
   pure (found', reportComplete report)
@@ -167,12 +168,15 @@ observing instrument simulated world = do
   evaluated whole = whole <$ evaluate (whole == whole)
   ticks = round
   recorded (s : others) transitions = case (stepKind s, transitions) of
-    (Note text, transition : later) | text == show transition -> (ticks (stepTime s), transition) : recorded others later
+    (Note text, transition : later)
+      | text == show transition -> (ticks (stepTime s), transition) : recorded others later
     -- The relation has the ends of branches only.
-    (Sim.Ends, _) | isBranch (stepLabel s) -> (ticks (stepTime s), IsOver (show (stepLabel s))) : recorded others transitions
+    (Sim.Ends, _)
+      | isBranch (stepLabel s) -> (ticks (stepTime s), IsOver (show (stepLabel s))) : recorded others transitions
     _ -> recorded others transitions
   recorded [] _ = []
-  isBranch (Label _ name) = name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "throttle", "hysteresis"]
+  isBranch (Label _ name) =
+    name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "throttle", "hysteresis"]
 
 -- | The state that a program runs with: the conditions, the number of calls of each action,
 -- how to fork into the innermost scope, and the innermost shared signal.
@@ -187,13 +191,19 @@ data Stage position = Stage
 -- not be a scheduling point.
 behavior :: Instrument position -> (Transition -> IO ()) -> World -> Behavior Value
 behavior instrument emit world = do
-  stage <- Stage <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure noNursery <*> pure (pure 0)
+  stage <-
+    Stage
+      <$> traverse newTVarIO (Map.fromList (conditions world))
+      <*> newIORef Map.empty
+      <*> pure noNursery
+      <*> pure (pure 0)
   let running at' = toBehavior instrument emit stage at' (program world)
   case caller world of
     Operator -> aroundPart instrument (root instrument) (FirstOf [program world]) $ \_ within ->
       firstOf [running (inBranch instrument "firstOf: 1" within), timeIsUp <$ environment stage]
     PlainThread type' later -> do
-      thread <- mask_ (start (Sim.Label "plain thread" "") (running (inBranch instrument "plain thread" (root instrument))))
+      thread <-
+        mask_ (start (Sim.Label "plain thread" "") (running (inBranch instrument "plain thread" (root instrument))))
       let interrupting = case type' of
             Asynchronous -> throwToAll (const Enough) [threadId thread]
             Synchronous -> throwToAll (const EnoughOfThis) [threadId thread]
@@ -206,7 +216,8 @@ behavior instrument emit world = do
   environment stage = do
     for_ (changes world) $ \(Change when condition level) -> do
       sleepUntil (fromIntegral when)
-      for_ (Map.lookup condition (levels stage)) $ \var -> atomically (writeTVar var level) >> whenSet instrument condition level
+      for_ (Map.lookup condition (levels stage)) $ \var ->
+        atomically (writeTVar var level) >> whenSet instrument condition level
       emit (condition `Becomes` level)
     sleepUntil (fromIntegral (cancelAt world))
   noNursery _ = throwIO (ErrorCall "a fork outside every scope")
@@ -233,16 +244,28 @@ toBehavior instrument emit stage = go
     AllOf ps -> Several <$> allOf (numbered ps)
     Decide choice ps q -> decide (chosenFrom choice (go outer q)) (numbered ps)
     RSelect signal left right -> rSelect (holds <$> level signal) (branch "left" left) (branch "right" right)
-    Monitor signal recovery task -> monitor (holds <$> level signal) (void (branch "recovery" recovery)) (branch "task" task)
-    InsteadWhen signal emergency q -> insteadWhen (holds <$> level signal) (branch "emergency" emergency) (branch "branch" q)
-    Switch signal branches -> switch (level signal) (\n -> branch "branch" (branches !! max 0 (min n (length branches - 1))))
-    TeleoReactive rules -> teleoReactive [(holds <$> level signal, branch ("rule " ++ show n) q) | (n, (signal, q)) <- zip [1 :: Int ..] rules]
+    Monitor signal recovery task ->
+      monitor (holds <$> level signal) (void (branch "recovery" recovery)) (branch "task" task)
+    InsteadWhen signal emergency q ->
+      insteadWhen (holds <$> level signal) (branch "emergency" emergency) (branch "branch" q)
+    Switch signal branches ->
+      switch (level signal) (\n -> branch "branch" (branches !! max 0 (min n (length branches - 1))))
+    TeleoReactive rules ->
+      teleoReactive
+        [(holds <$> level signal, branch ("rule " ++ show n) q) | (n, (signal, q)) <- zip [1 :: Int ..] rules]
     WaitUntil signal -> Unit <$ waitUntil (holds <$> level signal)
     WhileHolding signal q -> whileHolding (holds <$> level signal) (branch "branch" q)
     Timeout limit q -> timeout (fromIntegral limit) (branch "branch" q)
-    WithShared signal q -> withShared (levelIn (labelled "polling") signal) (\s -> toBehavior instrument emit stage {nearest = s} (labelled "body") q)
+    WithShared signal q ->
+      withShared (levelIn (labelled "polling") signal) $ \s ->
+        toBehavior instrument emit stage {nearest = s} (labelled "body") q
     Scoped body -> scoped $ \nursery ->
-      toBehavior instrument emit stage {forking = \child -> fork nursery (child (labelled "fork"))} (labelled "body") body
+      toBehavior
+        instrument
+        emit
+        stage {forking = \child -> fork nursery (child (labelled "fork"))}
+        (labelled "body")
+        body
     Fork q -> Unit <$ forking stage (`go` q)
     Await q r -> forking stage (`go` q) >>= \child -> go outer r >> atomically (await child)
     StopChild q r -> forking stage (`go` q) >>= \child -> go outer r >> requestStop child >> atomically (await child)

@@ -56,7 +56,9 @@ sourceSteps steps receive = go
     WithHysteresis m source -> inside t (WithHysteresis m) source ++ hysteresisSteps t m source
     Debounced d source -> inside t (Debounced d) source ++ debounceSteps t d source
     Throttled h source -> inside t (Throttled h) source ++ throttleSteps t h source
-    WithWatchdog w source -> inside t (WithWatchdog w) source ++ [(l, t', WithWatchdog w' source) | (l, t', w') <- watchdogSteps t w source]
+    WithWatchdog w source ->
+      inside t (WithWatchdog w) source
+        ++ [(l, t', WithWatchdog w' source) | (l, t', w') <- watchdogSteps t w source]
     _ -> []
   inside t around source = [(l, t', around source') | (l, t', source') <- go t source]
 
@@ -106,7 +108,9 @@ hysteresisSteps t m source =
     Just (Right (high', t', source'))
       | request worker /= Received, high' /= fromEnum (isHigh m) -> silently t' source'
     _ -> []
-    ++ [(Emits Silent, t, WithHysteresis m {hysteresisWorker = worker {request = Received}} source) | request worker == Requested]
+    ++ [ (Emits Silent, t, WithHysteresis m {hysteresisWorker = worker {request = Received}} source)
+       | request worker == Requested
+       ]
  where
   worker = hysteresisWorker m
 
@@ -125,7 +129,8 @@ debounceSteps t d source =
       Just (Right (value, t', source'))
         | Just value /= old -> silently t' (Debounced d {changeTracking = Observed old value} source')
       _ -> []
-    Observed old value -> silently' [(if isNothing old then counts value else waits value) {changeTracking = Tracked (Just value)}]
+    Observed old value ->
+      silently' [(if isNothing old then counts value else waits value) {changeTracking = Tracked (Just value)}]
   counts value = d {settled = Just value}
   waits value = d {pending = if settled d == Just value then Nothing else Just (value, clock t)}
   times = case timedChange d of
@@ -139,19 +144,25 @@ debounceSteps t d source =
 throttleSteps :: Now -> Throttler -> Source -> Steps Source
 throttleSteps t h source =
   (if request worker == Received then [] else next)
-    ++ [(Emits Silent, t, Throttled h {throttleWorker = worker {request = Received}} source) | request worker == Requested]
+    ++ [ (Emits Silent, t, Throttled h {throttleWorker = worker {request = Received}} source)
+       | request worker == Requested
+       ]
  where
   worker = throttleWorker h
   next = case restsUntil h of
     Just until' -> [step | clock t >= until', step <- silently t (Throttled h {restsUntil = Nothing} source)]
     Nothing -> case readSource t FirstRead (view worker) source of
       Just (Right (value, t', source'))
-        | Just value /= passed h -> silently t' (Throttled h {passed = Just value, restsUntil = Just (clock t + gap h)} source')
+        | Just value /= passed h ->
+            silently t' (Throttled h {passed = Just value, restsUntil = Just (clock t + gap h)} source')
       _ -> []
 
 -- | The watchdog.
 watchdogSteps :: Now -> Watchdog -> Source -> Steps Watchdog
-watchdogSteps t w source = if watchdogRequest w == Received then [] else watches ++ [(Emits Silent, t, w {watchdogRequest = Received}) | watchdogRequest w == Requested]
+watchdogSteps t w source =
+  if watchdogRequest w == Received
+    then []
+    else watches ++ [(Emits Silent, t, w {watchdogRequest = Received}) | watchdogRequest w == Requested]
  where
   watches = case (watchdogState w, oldestReading t source) of
     (NoReading, Just since) -> silently t w {watchdogState = InFlight since}

@@ -80,7 +80,8 @@ unstarted = \case
         , poll = PollEnded (Stopped Nothing)
         }
   And a b -> Joined AllHold [unstarted a, unstarted b]
-  Hysteresis initially l h s -> WithHysteresis HysteresisState {low = l, high = h, isHigh = initially, hysteresisWorker = resting} (unstarted s)
+  Hysteresis initially l h s ->
+    WithHysteresis HysteresisState {low = l, high = h, isHigh = initially, hysteresisWorker = resting} (unstarted s)
   Debounce n s ->
     Debounced
       Debouncer
@@ -93,8 +94,10 @@ unstarted = \case
         , timedChange = Nothing
         }
       (unstarted s)
-  Throttle n s -> Throttled Throttler {gap = n, passed = Nothing, throttleWorker = resting, restsUntil = Nothing} (unstarted s)
-  StaleAfter n s -> WithWatchdog Watchdog {limit = n, overdue = 0, watchdogRequest = Received, watchdogState = NoReading} (unstarted s)
+  Throttle n s ->
+    Throttled Throttler {gap = n, passed = Nothing, throttleWorker = resting, restsUntil = Nothing} (unstarted s)
+  StaleAfter n s ->
+    WithWatchdog Watchdog {limit = n, overdue = 0, watchdogRequest = Received, watchdogState = NoReading} (unstarted s)
   Shared -> SharedSource
  where
   resting = Worker {request = Received, view = Always}
@@ -104,7 +107,13 @@ unstarted = \case
 startSource :: Now -> Source -> Source
 startSource t = \case
   Polling s ->
-    Polling s {newest = Nothing, inFlightSince = Nothing, pollerRequest = NoRequest, poll = Sleeping (max (clock t) (slot s))}
+    Polling
+      s
+        { newest = Nothing
+        , inFlightSince = Nothing
+        , pollerRequest = NoRequest
+        , poll = Sleeping (max (clock t) (slot s))
+        }
   Joined how sources -> Joined how (map (startSource t) sources)
   WithHysteresis m source -> WithHysteresis m {hysteresisWorker = workerFor inner} inner
    where
@@ -124,7 +133,8 @@ startSource t = \case
   Throttled h source -> Throttled h {passed = Nothing, throttleWorker = workerFor inner, restsUntil = Nothing} inner
    where
     inner = startSource t source
-  WithWatchdog w source -> WithWatchdog (notOverdue w) {watchdogRequest = NoRequest, watchdogState = NoReading} (startSource t source)
+  WithWatchdog w source ->
+    WithWatchdog (notOverdue w) {watchdogRequest = NoRequest, watchdogState = NoReading} (startSource t source)
   other -> other
  where
   workerFor inner = Worker {request = NoRequest, view = viewOf t inner}
@@ -216,10 +226,16 @@ requestStopOfSource :: Source -> Source
 requestStopOfSource = \case
   Polling s -> Polling s {pollerRequest = requestStop' (pollerRequest s)}
   Joined how sources -> Joined how (map requestStopOfSource sources)
-  WithHysteresis m source -> WithHysteresis m {hysteresisWorker = requestStopOfWorker (hysteresisWorker m)} (requestStopOfSource source)
-  Debounced d source -> Debounced d {changeWorker = requestStopOfWorker (changeWorker d), timer = requestStop' (timer d)} (requestStopOfSource source)
-  Throttled h source -> Throttled h {throttleWorker = requestStopOfWorker (throttleWorker h)} (requestStopOfSource source)
-  WithWatchdog w source -> WithWatchdog w {watchdogRequest = requestStop' (watchdogRequest w)} (requestStopOfSource source)
+  WithHysteresis m source ->
+    WithHysteresis m {hysteresisWorker = requestStopOfWorker (hysteresisWorker m)} (requestStopOfSource source)
+  Debounced d source ->
+    Debounced
+      d {changeWorker = requestStopOfWorker (changeWorker d), timer = requestStop' (timer d)}
+      (requestStopOfSource source)
+  Throttled h source ->
+    Throttled h {throttleWorker = requestStopOfWorker (throttleWorker h)} (requestStopOfSource source)
+  WithWatchdog w source ->
+    WithWatchdog w {watchdogRequest = requestStop' (watchdogRequest w)} (requestStopOfSource source)
   other -> other
  where
   requestStopOfWorker w = w {request = requestStop' (request w)}

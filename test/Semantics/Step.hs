@@ -97,7 +97,8 @@ steps t = \case
       Nothing -> [(Forks Nothing p, t, Forked Nothing)]
       Just (stops, meanwhile) ->
         let k = length (takeWhile id (zipWith (==) [0 ..] (Map.keys (childResults t))))
-         in [(Forks (Just k) p, t {childResults = Map.insert k Nothing (childResults t)}, Forked (Just (k, stops, meanwhile)))]
+            child = Forked (Just (k, stops, meanwhile))
+         in [(Forks (Just k) p, t {childResults = Map.insert k Nothing (childResults t)}, child)]
   Forked Nothing -> silently t (Over (Succeeded Unit))
   Forked (Just (k, stops, meanwhile)) ->
     silently t (whenSuccessful ((if stops then StoppingChild else AwaitingChild) k) (begin t meanwhile))
@@ -106,7 +107,9 @@ steps t = \case
   StoppingChild k r -> [(l, t', whenSuccessful (StoppingChild k) r') | (l, t', r') <- steps t r]
   AwaitingChild k (Over _) -> case Map.lookup k (childResults t) of
     Just (Just result) ->
-      silently t {childResults = Map.delete k (childResults t), childStopRequests = Set.delete k (childStopRequests t)} (Over result)
+      silently
+        t {childResults = Map.delete k (childResults t), childStopRequests = Set.delete k (childStopRequests t)}
+        (Over result)
     _ -> []
   AwaitingChild k r -> [(l, t', whenSuccessful (AwaitingChild k) r') | (l, t', r') <- steps t r]
   AsChild k r -> [(l, t', AsChild k r') | (l, t', r') <- steps t r]
@@ -148,7 +151,10 @@ steps t = \case
     l -> [l]
   -- Requests the stop of the children whose handles have requested it.
   stopRequestedChildren threads =
-    [ (Emits Silent, t {childStopRequests = Set.delete k (childStopRequests t)}, Waiting Nursery (map (\c -> if isChild k c then requestStop c else c) threads))
+    [ ( Emits Silent
+      , t {childStopRequests = Set.delete k (childStopRequests t)}
+      , Waiting Nursery (map (\c -> if isChild k c then requestStop c else c) threads)
+      )
     | Nothing <- [verdict Nursery threads]
     , k <- Set.toList (childStopRequests t)
     , any (isChild k) threads
@@ -202,7 +208,11 @@ running' t requests r
   | isPending requests, not (null received) = received
   | otherwise = [(l, t', startedRequest, r') | (l, t', r') <- steps t r] ++ received
  where
-  received = [(Emits transition, t, requests', r') | Just requests' <- [afterReceiving requests], (transition, r') <- receive t r]
+  received =
+    [ (Emits transition, t, requests', r')
+    | Just requests' <- [afterReceiving requests]
+    , (transition, r') <- receive t r
+    ]
   startedRequest = if requests == NotStarted then NoRequest else requests
 
 -- | The possible results of receiving a stop request now. None: it cannot be received.
@@ -229,7 +239,8 @@ receive t = \case
   AwaitingChild k r -> within' (AwaitingChild k) r
   AsChild k r -> fmap (AsChild k) <$> receive t r
   Waiting operator threads -> [(Silent, conclude operator (Stopped Nothing) noSource some) | some <- started threads]
-  Reacting _ source _ phase -> [(Silent, conclude React (Stopped Nothing) source some) | some <- started (threadsOf phase)]
+  Reacting _ source _ phase ->
+    [(Silent, conclude React (Stopped Nothing) source some) | some <- started (threadsOf phase)]
   Sharing source body -> [(Silent, conclude Share (Stopped Nothing) source some) | some <- started [body]]
   Concluding operator _ source threads
     | allStopped source, all over threads -> [(Silent, Over (outcome operator (Stopped Nothing) source threads))]
@@ -264,7 +275,8 @@ threadSteps t (Thread label state) = case state of
   Live requests (AsChild k (Returning result)) -> returning (FinishedChild k) requests result
   Live requests r -> [(l, t', becomes requests' r') | (l, t', requests', r') <- running' t requests r]
   Finished result -> [ends' t result]
-  FinishedChild k result -> [ends' t {childResults = Map.insert k (Just (answer (asOutcome result))) (childResults t)} result]
+  FinishedChild k result ->
+    [ends' t {childResults = Map.insert k (Just (answer (asOutcome result))) (childResults t)} result]
   Ended _ -> []
  where
   returning finished requests result =

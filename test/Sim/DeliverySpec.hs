@@ -34,7 +34,9 @@ spec = guarded $ do
 
 -- | How the run ends under 1,000 schedules.
 everyEnd :: Show a => Behavior a -> IO [String]
-everyEnd act = nub . map (described . outcome) <$> mapM (\seed -> simulateWith defaultSimOptions {scheduled = Seeded seed} act) [1 .. 1000]
+everyEnd act =
+  nub . map (described . outcome)
+    <$> mapM (\seed -> simulateWith defaultSimOptions {scheduled = Seeded seed} act) [1 .. 1000]
  where
   described end = case end of
     Returned a -> show a
@@ -47,9 +49,11 @@ atTheUnmask = do
   late "if a checkpoint is restored within a mask" (mask $ \restore -> uninterruptible >> restore checkpoint)
   late "if nothing follows" uninterruptible
   late "if an empty action is restored within a mask" (mask $ \restore -> uninterruptible >> restore (pure ()))
-  late "if the target waits for a loser that is slow to stop" (firstOf [sleep 0.1, sleep 9 `onException` uninterruptible])
+  late "if the target waits for a loser that is slow to stop"
+    (firstOf [sleep 0.1, sleep 9 `onException` uninterruptible])
  where
-  late name act = it name $ everyEnd (timeout 0.15 (act >> pure "done") ? pure "timed out") `shouldReturn` [show "timed out"]
+  late name act =
+    it name $ everyEnd (timeout 0.15 (act >> pure "done") ? pure "timed out") `shouldReturn` [show "timed out"]
   uninterruptible = uninterruptibleMask_ (sleep 0.2)
 
 -- | Runs a target thread and an action that throws to it once the target has signalled that it
@@ -78,7 +82,10 @@ asGHC = do
             uninterruptibleMask_ (atomically (readTVar opened >>= STM.check))
             untilNone (restore (pure ())) record
         )
-        (\target -> mapM_ (\name -> throwToIt target name >> sleep 1) ["a", "b", "c"] >> atomically (writeTVar opened True))
+        ( \target -> do
+            mapM_ (\name -> throwToIt target name >> sleep 1) ["a", "b", "c"]
+            atomically (writeTVar opened True)
+        )
     order <- realOrder ["a", "b", "c"]
     returned run `shouldBe` Just (order ++ ["returned"])
   it "not at an operation that need not block, but at one that blocks" $ do
@@ -115,7 +122,8 @@ asGHC = do
         thread <- mask_ (start (Label "target" "") (checkpoint >> writeIORef ran True >> atomically STM.retry))
         interrupt (threadId thread) (Cancel "a")
         atomically (threadEnd thread)
-      fmap (either (show :: SomeException -> String) (\() -> "returned")) (returned run) `shouldBe` Just (show (Cancel "a"))
+      fmap (either (show :: SomeException -> String) (\() -> "returned")) (returned run)
+        `shouldBe` Just (show (Cancel "a"))
   it "at once if a thread throws it to itself, in any masking state" $ do
     run <- simulate (uninterruptibleMask_ (myThreadId >>= \me -> interrupt me (Cancel "me") >> pure "went on"))
     explain (outcome run) `shouldBe` "it was cancelled: " ++ show (Cancel "me")
@@ -135,7 +143,8 @@ asGHC = do
 
 -- | Unmasks until nothing is raised any more.
 untilNone :: IO () -> (String -> IO ()) -> IO ()
-untilNone unmasking record = try unmasking >>= either (\(e :: Cancel) -> record (show e) >> untilNone unmasking record) pure
+untilNone unmasking record =
+  try unmasking >>= either (\(e :: Cancel) -> record (show e) >> untilNone unmasking record) pure
 
 -- | The order in which GHC raises exceptions that are pending on one thread, all thrown from
 -- its own capability.
@@ -148,7 +157,8 @@ realOrder names = do
     me <- myThreadId
     forM_ names $ \name -> do
       thrower <- forkOnWithUnmask here (\free -> free (throwTo me (Cancel name)))
-      let untilBlocked = threadStatus thrower >>= \s -> unless (s == ThreadBlocked BlockedOnException) (yield >> untilBlocked)
+      let untilBlocked =
+            threadStatus thrower >>= \s -> unless (s == ThreadBlocked BlockedOnException) (yield >> untilBlocked)
       untilBlocked
     untilNone (unmask (pure ())) (\text -> modifyIORef logged (text :))
     putMVar end ()
@@ -257,8 +267,9 @@ endOfBranch = do
     ends `shouldContain` [show (True, show (Cancel "a"))]
 
   it "that polls a sensor keeps the fault of an uninterruptible reading" $
-    everyEnd (timeout 1 (Signal.waitUntil (Signal.polling 5 (uninterruptibleMask_ (sleep 2 >> throwIO (Fault "bug")) :: Behavior Bool))))
-      `shouldReturn` ["it faulted: " ++ displayException (Fault "bug")]
+    let stuck = uninterruptibleMask_ (sleep 2 >> throwIO (Fault "bug")) :: Behavior Bool
+     in everyEnd (timeout 1 (Signal.waitUntil (Signal.polling 5 stuck)))
+          `shouldReturn` ["it faulted: " ++ displayException (Fault "bug")]
 
 newtype Holding = Holding (IORef ())
 

@@ -120,14 +120,17 @@ counterexample = do
       Right _ -> expectationFailure "it should have been found"
   it "shows the property's exception with the plan's showException" $ do
     found <- tryExplore (randomly 1000) {planShowException = const "not two"} (counting 2)
-    take 3 (lines (either show show found)) `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one pre-emption, this happens:"]
+    take 3 (lines (either show show found))
+      `shouldBe` ["schedule 18 fails:", "  not two", "shrunk to one pre-emption, this happens:"]
   it "shows an exception that did not occur again with the plan's showException" $ do
     runs <- newIORef (0 :: Int)
-    found <- tryExplore (randomly 1) {planShowException = maybe "another" (\(Fault text) -> "fault " ++ text) . fromException} $ \run -> do
+    let asText = maybe "another" (\(Fault text) -> "fault " ++ text) . fromException
+    found <- tryExplore (randomly 1) {planShowException = asText} $ \run -> do
       n <- atomicModifyIORef' runs (\n -> (n + 1, n))
       _ <- run (pure ())
       when (n == 0) (throwIO (Fault "once"))
-    either (show . failingException) show found `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
+    either (show . failingException) show found
+      `shouldSatisfy` ("fault once\nBut when the same schedule was run again" `isPrefixOf`)
   it "shows only the steps that the plan selects, and their number" $ do
     found <- tryExplore (randomly 1000) {planSelectSteps = mentioning ["saw"]} (counting 2)
     (drop 2 . lines <$> either (Just . show) (const Nothing) found)
@@ -142,9 +145,11 @@ counterexample = do
     map stepThread (ofThreads [1, 3] (steps run)) `shouldBe` [1, 3, 1, 3]
   it "can be narrowed to the steps that mention a name, in the label or in the kind of step" $ do
     run <- simulate (both (annotate "a") (annotate "left"))
-    [(stepThread s, stepKind s) | s <- mentioning ["left"] (steps run)] `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
+    [(stepThread s, stepKind s) | s <- mentioning ["left"] (steps run)]
+      `shouldBe` [(1, Starts), (1, Note "a"), (1, Ends), (2, Note "left")]
   it "distinguishes the branches of two operators" $ do
-    run <- simulateWith defaultSimOptions {detailedSteps = True} (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
+    run <- simulateWith defaultSimOptions {detailedSteps = True}
+      (both (parallel (sleep 1) (sleep 2)) (parallel (sleep 3) (sleep 4)))
     lines (renderSteps (mentioning ["starts", "requests"] (steps run)))
       `shouldBe` [ "     0.000 s  1 both: left              starts"
                  , "     0.000 s  2 both: right             starts"
@@ -178,7 +183,9 @@ counterexample = do
       _ <- run (sleep 1)
       when (n == 5) (fail "the fifth run")
     case found of
-      Left c -> show c `shouldSatisfy` \described -> all (`isInfixOf` described) ["the fifth run", "run again, this did not happen"]
+      Left c ->
+        show c
+          `shouldSatisfy` \described -> all (`isInfixOf` described) ["the fifth run", "run again, this did not happen"]
       Right _ -> expectationFailure "it should have been found"
 
 properties :: Spec

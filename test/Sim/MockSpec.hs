@@ -69,7 +69,8 @@ calls = do
     ticket <- action mock "ticket" (map returning [1 :: Int ..])
     tickets <- mapConcurrently (const (replicateM 50 ticket)) "12345678"
     sort (concat tickets) `shouldBe` [1 .. 400]
-    sort . map entryCall . filter ((== Succeeds) . entryKind) . recordEntries <$> happened mock `shouldReturn` [1 .. 400]
+    sort . map entryCall . filter ((== Succeeds) . entryKind) . recordEntries <$> happened mock
+      `shouldReturn` [1 .. 400]
     count' <- sensor mock "count" (map returning [1 :: Int ..])
     counts <- mapConcurrently (const (replicateM 50 count')) "12345678"
     sort (concat counts) `shouldBe` [1 .. 400]
@@ -83,7 +84,8 @@ calls = do
 
   it "has separate scripts for each argument" $ do
     mock <- newMock
-    open <- actionOn mock "open" $ \door -> if door == "front" then [fails "locked"] else [fails "stuck", returning door]
+    open <- actionOn mock "open" $ \door ->
+      if door == "front" then [fails "locked"] else [fails "stuck", returning door]
     ending (fallbackOver ["front", "back"] open) `shouldReturn` FailedWith "FailedBecause \"stuck\""
     fallbackOver ["front", "back"] open `shouldReturn` "back"
     map show . recordEntries <$> happened mock
@@ -104,7 +106,11 @@ taking' = do
     walk <- action mock "walk" [succeeds `taking` 1 `taking` 1.5, fails "tired" `taking` 0.5]
     runSimulated (walk >> walk) `shouldReturn` ("failed FailedBecause \"tired\"", 3)
     timelineOf mock
-      `shouldReturn` ["0.0 s  walk: begins", "2.5 s  walk: done", "2.5 s  walk: begins (call 2)", "3.0 s  walk: fails, tired (call 2)"]
+      `shouldReturn` [ "0.0 s  walk: begins"
+                     , "2.5 s  walk: done"
+                     , "2.5 s  walk: begins (call 2)"
+                     , "3.0 s  walk: fails, tired (call 2)"
+                     ]
 
   it "has its effect when its time is over, and not when it is stopped" $
     for_ [(4, "returned True", 4), (6, "returned False", 5)] $ \(limit, end, t) -> do
@@ -157,15 +163,16 @@ stopped = do
       `shouldReturn` (("returned 'x'", 9), [(0, Begins), (1, StopRequested), (9, Succeeds)])
 
   it "cannot be interrupted again" $
-    for_ [(hangs `slowToStop` 5, 6, Stops), (completesAnyway (succeeds `taking` 9), 9, Succeeds)] $ \(script, t, end) -> do
-      mock <- newMock
-      act <- action mock "act" [script]
-      _ <- simulate $ do
-        thread <- mask_ (start (Label "test" "act") act)
-        replicateM_ 3 $ sleep 1 >> throwToAll (const (Cancel "again")) [threadId thread]
-        atomically (threadEnd thread)
-      map (\e -> (entryTime e, entryKind e)) . recordEntries <$> happened mock
-        `shouldReturn` [(0, Begins), (1, StopRequested), (t, end)]
+    for_ [(hangs `slowToStop` 5, 6, Stops), (completesAnyway (succeeds `taking` 9), 9, Succeeds)] $
+      \(script, t, end) -> do
+        mock <- newMock
+        act <- action mock "act" [script]
+        _ <- simulate $ do
+          thread <- mask_ (start (Label "test" "act") act)
+          replicateM_ 3 $ sleep 1 >> throwToAll (const (Cancel "again")) [threadId thread]
+          atomically (threadEnd thread)
+        map (\e -> (entryTime e, entryKind e)) . recordEntries <$> happened mock
+          `shouldReturn` [(0, Begins), (1, StopRequested), (t, end)]
 
   it "does not begin when the request comes first" $ do
     mock <- newMock
@@ -208,7 +215,8 @@ records = do
     ran <- simulate (act ? Signal.waitUntil (signal low))
     [(Sim.stepTime step, text) | step <- Sim.steps ran, Sim.Note text <- [Sim.stepKind step]]
       `shouldBe` [(0, "act: begins"), (2, "act: fails, x"), (2, "low: becomes True")]
-    timelineOf mock `shouldReturn` ["0.0 s  low: is False", "0.0 s  act: begins", "1.0 s  low: becomes True", "2.0 s  act: fails, x"]
+    timelineOf mock
+      `shouldReturn` ["0.0 s  low: is False", "0.0 s  act: begins", "1.0 s  low: becomes True", "2.0 s  act: fails, x"]
 
 sensors :: Spec
 sensors = do
@@ -222,7 +230,11 @@ sensors = do
     range <- sensor mock "range" (map returning [9, 9, 8, 8, 8, 9, 5 :: Int])
     _ <- simulate (Signal.waitUntil ((== 5) <$> Signal.polling 1 range))
     timelineOf mock
-      `shouldReturn` ["0.0 s  range: becomes 9", "2.0 s  range: becomes 8", "5.0 s  range: becomes 9", "6.0 s  range: becomes 5"]
+      `shouldReturn` [ "0.0 s  range: becomes 9"
+                     , "2.0 s  range: becomes 8"
+                     , "5.0 s  range: becomes 9"
+                     , "6.0 s  range: becomes 5"
+                     ]
 
   it "can be late, and can fault" $ do
     mock <- newMock
@@ -235,7 +247,8 @@ polled = do
   it "gives its value at each time" $ do
     mock <- newMock
     level <- condition mock "level" [(0, 'a'), (1, 'b'), (2, 'c')]
-    runSimulated (sequence [reading level, sleep 1 >> reading level, sleep 0.5 >> reading level, sleep 9 >> reading level])
+    let levelAfter n = sleep n >> reading level
+    runSimulated (sequence [reading level, levelAfter 1, levelAfter 0.5, levelAfter 9])
       `shouldReturn` ("returned \"abbc\"", 10.5)
 
   it "is recorded at the times of its changes, whether it is read or not" $ do
@@ -301,7 +314,8 @@ watched = do
   it "waits for its first value, and fails its operator when it has no value any more" $ do
     mock <- newMock
     level <- partialCondition mock "level" [(1, Just 'a'), (2, Nothing)]
-    runSimulated (Signal.waitUntil ((== 'b') <$> signal level)) `shouldReturn` ("failed FailedBecause \"level has no value any more\"", 2)
+    runSimulated (Signal.waitUntil ((== 'b') <$> signal level))
+      `shouldReturn` ("failed FailedBecause \"level has no value any more\"", 2)
 
   it "starts no thread that outlives its operator, and none when it will not change" $ do
     mock <- newMock
@@ -309,10 +323,12 @@ watched = do
     leavingNothing (Signal.rSelect (signal low) (pure 'l') (pure 'r')) `shouldReturn` 'r'
     wet <- newMock >>= \another -> condition another "wet" [(0, True)]
     ran <- simulate (Signal.waitUntil (signal wet))
-    [Sim.stepLabel step | step <- Sim.steps ran, Sim.stepKind step == Sim.Starts] `shouldNotContain` [Label "waitUntil" "clock"]
+    [Sim.stepLabel step | step <- Sim.steps ran, Sim.stepKind step == Sim.Starts]
+      `shouldNotContain` [Label "waitUntil" "clock"]
     cold <- newMock >>= \another -> condition another "cold" [(0, False), (1, True)]
     other <- simulate (Signal.waitUntil (signal cold))
-    [Sim.stepLabel step | step <- Sim.steps other, Sim.stepKind step == Sim.Starts] `shouldContain` [Label "waitUntil" "clock"]
+    [Sim.stepLabel step | step <- Sim.steps other, Sim.stepKind step == Sim.Starts]
+      `shouldContain` [Label "waitUntil" "clock"]
 
   it "works when the clock of the world was started late, with any rounding" $
     for_ [0.1, 0.7, 1 / 3, 1e6 + 0.1] $ \t -> do
@@ -331,7 +347,8 @@ setting = do
   it "wakes its watchers, and records only values that are different" $ do
     mock <- newMock
     wet <- condition mock "wet" [(0, False)]
-    runSimulated (Signal.waitUntil (signal wet) `both` (set wet False >> sleep 1 >> set wet True)) `shouldReturn` ("returned ()", 1)
+    runSimulated (Signal.waitUntil (signal wet) `both` (set wet False >> sleep 1 >> set wet True))
+      `shouldReturn` ("returned ()", 1)
     mock `shouldRecord` exactly 2 (anyOf [becoming "wet" False, becoming "wet" True])
 
   it "can lose its value" $ do
@@ -369,7 +386,12 @@ worlds = do
     mock <- newMock
     act <- action mock "act" [succeeds]
     _ <- simulate act
-    let report = ["This does not hold: never \"act\" is done.", "It was so at 0.0 s:", "    0.0 s  act: begins", "  > 0.0 s  act: done"]
+    let report =
+          [ "This does not hold: never \"act\" is done."
+          , "It was so at 0.0 s:"
+          , "    0.0 s  act: begins"
+          , "  > 0.0 s  act: done"
+          ]
         isReported claim = (mock `shouldRecord` claim) `shouldThrow` \(BrokenClaim why) -> lines why == report
     isReported (never (successOf "act"))
     -- Of several, the one that does not hold.
@@ -388,9 +410,12 @@ refusals = do
 
   it "is an invalid duration" $ do
     mock <- newMock
-    action mock "act" [succeeds, succeeds `taking` (-1)] `refused` "action \"act\": a duration is zero or more seconds, not -1.0"
-    action mock "act" [succeeds `taking` (0 / 0)] `refused` "action \"act\": a duration is zero or more seconds, not NaN"
-    action mock "act" [succeeds `slowToStop` (-1)] `refused` "action \"act\": a duration is zero or more seconds, not -1.0"
+    action mock "act" [succeeds, succeeds `taking` (-1)]
+      `refused` "action \"act\": a duration is zero or more seconds, not -1.0"
+    action mock "act" [succeeds `taking` (0 / 0)]
+      `refused` "action \"act\": a duration is zero or more seconds, not NaN"
+    action mock "act" [succeeds `slowToStop` (-1)]
+      `refused` "action \"act\": a duration is zero or more seconds, not -1.0"
 
   it "is a change at an invalid time, or out of order" $ do
     mock <- newMock
@@ -407,6 +432,7 @@ refusals = do
   it "is a claim about an unknown name" $ do
     mock <- newMock
     _ <- action mock "act" [succeeds]
-    (mock `shouldRecord` never (startOf "atc")) `shouldThrow` \(BrokenClaim why) -> "called \"atc\", only \"act\"" `isInfixOf` why
+    (mock `shouldRecord` never (startOf "atc"))
+      `shouldThrow` \(BrokenClaim why) -> "called \"atc\", only \"act\"" `isInfixOf` why
  where
   act `refused` why = act `shouldThrow` (== ErrorCall why)

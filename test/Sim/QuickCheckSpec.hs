@@ -93,7 +93,10 @@ verdicts = do
         run <- simulating (sleep (fromIntegral (n :: Int)))
         pure (finished run < 20)
     drop 2 (lines (output result))
-      `shouldBe` ["     0.000 s  0 main  sleeps until 20.000 s", "to see it again: explore (replaying (Preempting []))", "20"]
+      `shouldBe` [ "     0.000 s  0 main  sleeps until 20.000 s"
+                 , "to see it again: explore (replaying (Preempting []))"
+                 , "20"
+                 ]
   it "nothing is shrunk if maxShrinks is 0" $ do
     result <- quickCheckWithResult thorough {maxShrinks = 0} counting
     numShrinks result `shouldBe` 0

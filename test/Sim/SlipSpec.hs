@@ -30,13 +30,15 @@ spec = guarded . describe "Slip" $ do
     ordersWith 0.5 [1, 1.5] `shouldReturn` [[1, 1.5]]
     ordersWith 0 [1, 1.3] `shouldReturn` [[1, 1.3]]
   it "makes some sleepers late, each by less than the slip" $ do
-    lates <- mapM (\seed -> late <$> simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 0.5} sleepers) [1 .. 300]
+    let slipping seed = simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 0.5} sleepers
+    lates <- mapM (fmap late . slipping) [1 .. 300]
     forM_ lates $ \l -> l `shouldSatisfy` maybe False (all (\s -> 0 <= s && s < 0.5))
     lates `shouldSatisfy` any (maybe False (any (> 0)))
   it "is part of the schedule of a run" $
     forM_ [1 .. 100] $ \seed -> do
       one <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 0.5, detailedSteps = True} sleepers
-      other <- simulateWith defaultSimOptions {scheduled = runSchedule one, timerSlip = 0.5, detailedSteps = True} sleepers
+      let again = defaultSimOptions {scheduled = runSchedule one, timerSlip = 0.5, detailedSteps = True}
+      other <- simulateWith again sleepers
       (steps one, runSchedule one, finished one) `shouldBe` (steps other, runSchedule other, finished other)
   it "is explored exhaustively, and does not count as a pre-emption" $ do
     orders <- newIORef []
@@ -49,7 +51,8 @@ spec = guarded . describe "Slip" $ do
       `shouldReturn` sort [[1, 1.3, 1.4], [1, 1.4, 1.3], [1.3, 1, 1.4], [1.3, 1.4, 1], [1.4, 1, 1.3], [1.4, 1.3, 1]]
   it "does not move the time beyond endAt" $
     forM_ [1 .. 50] $ \seed -> do
-      run <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 5, endAt = 2} (both (sleep 1) (sleep 4))
+      run <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = 5, endAt = 2}
+        (both (sleep 1) (sleep 4))
       finished run `shouldBe` 2
   it "finds a defect that depends on exact timers" $ do
     found <- tryExplore ((randomly 1000) {planOptions = defaultSimOptions {timerSlip = 0.1}}) $ \simulated -> do

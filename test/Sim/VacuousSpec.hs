@@ -49,7 +49,8 @@ worlds = do
   it "is one that was not used at all, of which no claim is made" $ do
     (world, drive, _) <- rover
     void (simulate (pure () ? drive))
-    (world `shouldRecord` never (startOf "drive")) `shouldThrow` \(BrokenClaim why) -> "begin it: simulate (begin world" `isInfixOf` why
+    (world `shouldRecord` never (startOf "drive"))
+      `shouldThrow` \(BrokenClaim why) -> "begin it: simulate (begin world" `isInfixOf` why
   it "can begin with nothing else, so that such a claim is made" $ do
     (world, drive, _) <- rover
     void (simulate (begin world >> pure () ? drive))
@@ -72,12 +73,19 @@ explorations = do
   for_ plans $ \(name, plan, why) ->
     it ("is refused: " ++ name) $
       explore plan (\simulated -> void (simulated (sleep 1))) `shouldThrow` (== ErrorCall ("explore: " ++ why))
-  for_ [randomly 3, exhaustively 1, replaying NonPreemptive, (randomly 1) {planSearch = Shrink NonPreemptive}] $ \plan ->
-    it ("is refused, when its property simulates nothing: " ++ show (planSearch plan)) $
-      explore plan (\_ -> pure ()) `shouldThrow` saying "the property has simulated nothing"
-  for_ [("endAt", -1, \t o -> o {endAt = t}), ("endAt", 0 / 0, \t o -> o {endAt = t}), ("timerSlip", -1, \t o -> o {timerSlip = t}), ("realTimeLimit", -1, \t o -> o {realTimeLimit = t})] $
-    \(name, t, with) -> it ("is refused, when a run has the " ++ name ++ " " ++ show t) $
-      simulateWith (with t defaultSimOptions) (sleep 1) `shouldThrow` (== ErrorCall (name ++ ": a duration is zero or more seconds, not " ++ show t))
+  for_ [randomly 3, exhaustively 1, replaying NonPreemptive, (randomly 1) {planSearch = Shrink NonPreemptive}] $
+    \plan ->
+      it ("is refused, when its property simulates nothing: " ++ show (planSearch plan)) $
+        explore plan (\_ -> pure ()) `shouldThrow` saying "the property has simulated nothing"
+  for_
+    [ ("endAt", -1, \t o -> o {endAt = t})
+    , ("endAt", 0 / 0, \t o -> o {endAt = t})
+    , ("timerSlip", -1, \t o -> o {timerSlip = t})
+    , ("realTimeLimit", -1, \t o -> o {realTimeLimit = t})
+    ]
+    $ \(name, t, with) -> it ("is refused, when a run has the " ++ name ++ " " ++ show t) $
+        simulateWith (with t defaultSimOptions) (sleep 1)
+          `shouldThrow` (== ErrorCall (name ++ ": a duration is zero or more seconds, not " ++ show t))
   it "is refused, when its property simulates nothing under one of the schedules" $ do
     runs <- newIORef (0 :: Int)
     let thrice simulated = modifyIORef runs (+ 1) >> readIORef runs >>= \n -> when (n < 3) (void (simulated (sleep 1)))
@@ -95,7 +103,10 @@ explorations = do
     [ ("randomly (-3)", randomly (-3), "a random plan has at least 1 schedule, and not -3")
     , ("randomly 0", randomly 0, "a random plan has at least 1 schedule, and not 0")
     , ("exhaustively (-1)", exhaustively (-1), "an exhaustive plan has at least 0 pre-emptions, and not -1")
-    , ("Exhaustive 1 0", (randomly 1) {planSearch = Exhaustive 1 0}, "an exhaustive plan has at least 1 schedule, and not 0")
+    , ( "Exhaustive 1 0"
+      , (randomly 1) {planSearch = Exhaustive 1 0}
+      , "an exhaustive plan has at least 1 schedule, and not 0"
+      )
     ]
 
 coverage :: Spec

@@ -51,29 +51,85 @@ tracedRight =
 rareWorlds :: [World]
 rareWorlds =
   [ -- The operator is cancelled while it reads again, after its reaction has stopped a branch.
-    (world (TeleoReactive [(Watched "q", act "a" 1 (Succeeds 0)), (Polled 3 (act "s" 2 (Succeeds 2)), act "b" 1 (Succeeds 0))])) {changes = [Change 2 "q" (At 2)], cancelAt = 1}
-  , (world (InsteadWhen (Watched "p") (act "a" 1 (Succeeds 0)) (RSelect (Polled 2 (Do "s" [script 1 (Succeeds 1), script 0 (Succeeds 0)])) (act "b" 9 (Succeeds 0)) (act "c" 1 (Succeeds 0)))))
+    ( world
+        ( TeleoReactive
+            [ (Watched "q", act "a" 1 (Succeeds 0))
+            , (Polled 3 (act "s" 2 (Succeeds 2)), act "b" 1 (Succeeds 0))
+            ]
+        )
+    )
+      { changes = [Change 2 "q" (At 2)]
+      , cancelAt = 1
+      }
+  , ( world
+        ( InsteadWhen
+            (Watched "p")
+            (act "a" 1 (Succeeds 0))
+            ( RSelect
+                (Polled 2 (Do "s" [script 1 (Succeeds 1), script 0 (Succeeds 0)]))
+                (act "b" 9 (Succeeds 0))
+                (act "c" 1 (Succeeds 0))
+            )
+        )
+    )
       { cancelAt = 3
       , caller = PlainThread Synchronous 0
       }
   , -- It is cancelled while it stops the sensors, before the recovery.
-    (world (Both (Timeout 3 (act "a" 0 Fails)) (InsteadWhen (Debounce 2 (Watched "q")) (act "b" 1 (Succeeds 0)) (act "c" 1 (Succeeds 0))))) {conditions = [("p", At 0), ("q", At 1)]}
+    ( world
+        ( Both
+            (Timeout 3 (act "a" 0 Fails))
+            (InsteadWhen (Debounce 2 (Watched "q")) (act "b" 1 (Succeeds 0)) (act "c" 1 (Succeeds 0)))
+        )
+    )
+      { conditions = [("p", At 0), ("q", At 1)]
+      }
   , -- A branch completes although its stop was requested.
-    (world (RSelect (Hysteresis False 0 2 (Watched "p")) (act "a" 9 (Succeeds 0)) (Do "b" [(script 9 (Succeeds 0)) {onStop = EndsAfter 1 (Succeeds 1)}]))) {changes = [Change 1 "p" (At 2)]}
+    ( world
+        ( RSelect
+            (Hysteresis False 0 2 (Watched "p"))
+            (act "a" 9 (Succeeds 0))
+            (Do "b" [(script 9 (Succeeds 0)) {onStop = EndsAfter 1 (Succeeds 1)}])
+        )
+    )
+      { changes = [Change 1 "p" (At 2)]
+      }
   , -- The condition changes, and changes back.
-    (world (RSelect (Watched "p") (act "a" 9 (Succeeds 0)) (act "b" 9 (Succeeds 0)))) {changes = [Change 1 "p" (At 1), Change 1 "p" (At 0), Change 2 "p" (At 1)]}
-  , (world (Monitor (Watched "p") (act "a" 1 (Succeeds 0)) (act "b" 9 (Succeeds 0)))) {changes = [Change 1 "p" (At 1), Change 1 "p" (At 0)]}
+    (world (RSelect (Watched "p") (act "a" 9 (Succeeds 0)) (act "b" 9 (Succeeds 0))))
+      { changes = [Change 1 "p" (At 1), Change 1 "p" (At 0), Change 2 "p" (At 1)]
+      }
+  , (world (Monitor (Watched "p") (act "a" 1 (Succeeds 0)) (act "b" 9 (Succeeds 0))))
+      { changes = [Change 1 "p" (At 1), Change 1 "p" (At 0)]
+      }
   , -- The sensor decides, and at the same time the other condition changes.
-    (world (Monitor (And (Polled 2 (Do "s" [script 0 (Succeeds 0), script 0 (Succeeds 1)])) (Watched "p")) (act "a" 1 (Succeeds 0)) (act "b" 9 (Succeeds 0))))
+    ( world
+        ( Monitor
+            (And (Polled 2 (Do "s" [script 0 (Succeeds 0), script 0 (Succeeds 1)])) (Watched "p"))
+            (act "a" 1 (Succeeds 0))
+            (act "b" 9 (Succeeds 0))
+        )
+    )
       { conditions = [("p", At 1), ("q", At 0)]
       , changes = [Change 2 "p" (At 0)]
       }
   , -- Two branches fail, or end, at the same time.
-    world (Both (act "a" 1 Fails) (act "b" 1 Fails `Then` act "c" 1 Fails) `Else` Parallel (act "d" 1 (Succeeds 0)) (act "e" 1 Fails))
-  , world (AllOf [act "a" 2 (Succeeds 0), act "b" 1 Fails, act "c" 3 (Succeeds 0)] `Else` FirstOf [act "d" 2 Fails, act "e" 1 (Succeeds 0)])
+    world $
+      Both (act "a" 1 Fails) (act "b" 1 Fails `Then` act "c" 1 Fails)
+        `Else` Parallel (act "d" 1 (Succeeds 0)) (act "e" 1 Fails)
+  , world $
+      AllOf [act "a" 2 (Succeeds 0), act "b" 1 Fails, act "c" 3 (Succeeds 0)]
+        `Else` FirstOf [act "d" 2 Fails, act "e" 1 (Succeeds 0)]
   ]
  where
-  world p = World {conditions = [("p", At 0), ("q", At 0)], changes = [], cancelAt = 9, program = p, caller = Operator, slippage = 0}
+  world p =
+    World
+      { conditions = [("p", At 0), ("q", At 0)]
+      , changes = []
+      , cancelAt = 9
+      , program = p
+      , caller = Operator
+      , slippage = 0
+      }
   act name n how = Do name [script n how]
   script n how = Script n how Unmasked StopsAtOnce
 

@@ -96,11 +96,17 @@ recordedRun around salt how w = do
         Just _ -> do
           n <- part
           thread <- self
-          noting (write (Operates thread n here p)) (write . HasOperated thread n) (run here (Position (Just n) Nothing))
+          noting (write (Operates thread n here p)) (write . HasOperated thread n) $
+            run here (Position (Just n) Nothing)
       chance p = do
         n <- readIORef lastPart
         pure (scrambled (salt * 7919 + n) `mod` 8 < (case p of Do _ _ -> 6; _ -> 3))
-      receiver detail = Receiver {firstNumber = 1, needsDetail = detail, receiveEvent = \e -> self >>= \thread -> write (Received detail thread e)}
+      receiver detail =
+        Receiver
+          { firstNumber = 1
+          , needsDetail = detail
+          , receiveEvent = \e -> self >>= \thread -> write (Received detail thread e)
+          }
       instrument =
         Instrument
           { root = Position Nothing Nothing
@@ -108,7 +114,9 @@ recordedRun around salt how w = do
           , aroundAll = \act -> mask $ \restore ->
               myPlace >>= \case
                 Nothing -> restore (around act)
-                Just place -> inPlace (Just place {trace = withReceiver (receiver True) (withReceiver (receiver False) (trace place))}) (restore (around act))
+                Just place ->
+                  let both' = withReceiver (receiver True) (withReceiver (receiver False) (trace place))
+                   in inPlace (Just place {trace = both'}) (restore (around act))
           , aroundPart = \here p run -> chance p >>= \isNamed -> within here p isNamed (\here' -> operating here' p run)
           , aroundCleanup = \here act -> chance (Pure Unit) >>= \isNamed -> within here (Pure Unit) isNamed (const act)
           , whenSet = \condition level -> write (IsSet condition level)

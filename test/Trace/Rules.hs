@@ -60,7 +60,11 @@ indexed record =
     { record' = record
     , complete = either (const False) (const True) (seen record) && finishes
     , begun = starts
-    , over = Map.fromList [(spanNumber s, (at, thread, s, realToFrac t, end')) | (at, Received True thread (Ended s t end')) <- entries record]
+    , over =
+        Map.fromList
+          [ (spanNumber s, (at, thread, s, realToFrac t, end'))
+          | (at, Received True thread (Ended s t end')) <- entries record
+          ]
     , reacted = Map.fromList [(reactionNumber r, (at, r)) | (at, Received True _ (Reacted r)) <- entries record]
     , threadsBranch = Map.fromList (reverse [(thread, s) | (_, thread, s) <- Map.elems starts, spanKind s == Branch])
     , spanOf = Map.fromList bound
@@ -106,13 +110,18 @@ structure x = concat (twice : map each (Map.elems (begun x)))
   twice =
     [ "more than once: " ++ show e
     | detail <- [True, False]
-    , e : _ : _ <- group (sort ([(0 :: Int, spanNumber s) | (_, Received d _ (Began s)) <- es, d == detail] ++ [(1, spanNumber s) | (_, Received d _ (Ended s _ _)) <- es, d == detail] ++ [(2, reactionNumber r) | (_, Received d _ (Reacted r)) <- es, d == detail]))
+    , e : _ : _ <- group (sort [key | (_, Received d _ received) <- es, d == detail, key <- identity received])
     ]
       ++ ["not begun: " ++ show s | (_, Received True _ (Ended s _ _)) <- es, spanNumber s `Map.notMember` begun x]
       ++ ["lost: " ++ show n | (_, Received _ _ (Lost n)) <- es]
       ++ ["events of the run differ" | [e | (_, Received True _ e) <- es] /= Sim.events (whole (record' x)), complete x]
       ++ ["a number both of a span and of a reaction" | any (`Map.member` begun x) (Map.keys (reacted x))]
   es = entries (record' x)
+  identity = \case
+    Began s -> [(0 :: Int, spanNumber s)]
+    Ended s _ _ -> [(1, spanNumber s)]
+    Reacted r -> [(2, reactionNumber r)]
+    Lost _ -> []
   each (at, thread, s) = case Map.lookup (spanNumber s) (over x) of
     Nothing -> ["has not ended: " ++ show s | complete x]
     Just (end', thread', s', t, _) ->
@@ -132,57 +141,92 @@ structure x = concat (twice : map each (Map.elems (begun x)))
 sameAmongNamed :: Indexed -> [String]
 sameAmongNamed x =
   [ "differs: " ++ show (expected, given)
-  | (expected, given) <- padded [e' | (_, Received True _ e) <- es, Just e' <- [amongNamed' e]] [e | (_, Received False _ e) <- es]
+  | (expected, given) <-
+      padded
+        [e' | (_, Received True _ e) <- es, Just e' <- [amongNamed' e]]
+        [e | (_, Received False _ e) <- es]
   , expected /= given
   ]
  where
   es = entries (record' x)
-  padded as bs = take (max (length as) (length bs)) (zip (map Just as ++ repeat Nothing) (map Just bs ++ repeat Nothing))
+  padded as bs =
+    take (max (length as) (length bs)) (zip (map Just as ++ repeat Nothing) (map Just bs ++ repeat Nothing))
   amongNamed' = \case
     Began s | spanKind s == Named -> Just (Began (nearest s))
     Ended s t end' | spanKind s == Named -> Just (Ended (nearest s) t end')
     Reacted r -> Just (Reacted r {reactionParent = fst (up (reactionParent r))})
     _ -> Nothing
-  nearest s = let (p, reaction) = up (spanParent s) in s {spanParent = p, spanReaction = orElse (spanReaction s) reaction}
+  nearest s =
+    let (p, reaction) = up (spanParent s)
+     in s {spanParent = p, spanReaction = orElse (spanReaction s) reaction}
   orElse (Just a) _ = Just a
   orElse Nothing b = b
   up = \case
     Inside n
       | Just (_, _, s) <- Map.lookup n (begun x) -> case spanKind s of
           Named -> (Inside n, Nothing)
-          _ -> (`orElse` spanReaction s) `seq` let (p, reaction) = up (spanParent s) in (p, spanReaction s `orElse` reaction)
+          _ ->
+            let (p, reaction) = up (spanParent s)
+             in (p, spanReaction s `orElse` reaction)
     p -> (p, Nothing)
 
 -- | The parent of each span is what the program says.
 parents :: Indexed -> [String]
 parents x =
-  [ "no part of the program: " ++ show s | (_, _, s) <- Map.elems (begun x), spanKind s /= Branch, spanNumber s `Map.notMember` partOf x]
+  [ "no part of the program: " ++ show s
+  | (_, _, s) <- Map.elems (begun x)
+  , spanKind s /= Branch
+  , spanNumber s `Map.notMember` partOf x
+  ]
     ++ [ "the parent of " ++ show s ++ " is not that of " ++ show (here, p)
        | (n, (here, p)) <- Map.toList (partOf x)
        , Just (_, thread, s) <- [Map.lookup n (begun x)]
        , not (fits here thread (spanParent s))
        ]
-    ++ ["another name: " ++ show s | (n, (_, p)) <- Map.toList (partOf x), Just (_, _, s) <- [Map.lookup n (begun x)], spanKind s == Operator, Just (spanName s) /= operatorName p]
+    ++ [ "another name: " ++ show s
+       | (n, (_, p)) <- Map.toList (partOf x)
+       , Just (_, _, s) <- [Map.lookup n (begun x)]
+       , spanKind s == Operator
+       , Just (spanName s) /= operatorName p
+       ]
     ++ concat
       [ case (spanName s, spanParent s) of
           ("plain thread", Top) -> []
-          (name, Inside p) | Just (_, thread', o) <- Map.lookup p (begun x), spanKind o == Operator, (spanName o ++ ": ") `isPrefixOf` name, thread' /= thread -> []
+          (name, Inside p)
+            | Just (_, thread', o) <- Map.lookup p (begun x)
+            , spanKind o == Operator
+            , (spanName o ++ ": ") `isPrefixOf` name
+            , thread' /= thread ->
+                []
           _ -> ["a branch of no operator: " ++ show s]
       | (_, thread, s) <- Map.elems (begun x)
       , spanKind s == Branch
       ]
-    ++ ["no span, but it was not stopped: " ++ show (n, p) | (_, HasLeft _ n how) <- es, not (isStop how), n `Map.notMember` spanOf x, Just (p, True) <- [Map.lookup n named']]
-    ++ ["no span of an operator: " ++ show (n, p) | (_, HasOperated _ n Returns) <- es, n `Map.notMember` spanOf x, Just p <- [Map.lookup n operators], not (isDecide p)]
+    ++ [ "no span, but it was not stopped: " ++ show (n, p)
+       | (_, HasLeft _ n how) <- es
+       , not (isStop how)
+       , n `Map.notMember` spanOf x
+       , Just (p, True) <- [Map.lookup n named']
+       ]
+    ++ [ "no span of an operator: " ++ show (n, p)
+       | (_, HasOperated _ n Returns) <- es
+       , n `Map.notMember` spanOf x
+       , Just p <- [Map.lookup n operators]
+       , not (isDecide p)
+       ]
  where
   es = entries (record' x)
   named' = Map.fromList [(n, (p, isNamed)) | (_, Entered _ n _ p isNamed) <- es]
   operators = Map.fromList [(n, p) | (_, Operates _ n _ p) <- es]
   isDecide = \case Decide {} -> True; _ -> False
   fits here thread parent = case via here of
-    Nothing -> parent == ownerOf here && (isNothing (owner here) || fmap (\(_, thread', _) -> thread') (ownerSpan here) == Just thread)
+    Nothing -> parent == ownerOf here && (isNothing (owner here) || ownerThread here == Just thread)
     Just label -> case parent of
-      Inside b | Just (_, thread', s) <- Map.lookup b (begun x) -> spanKind s == Branch && spanName s == label && spanParent s == ownerOf here && thread == thread'
+      Inside b
+        | Just (_, thread', s) <- Map.lookup b (begun x) ->
+            spanKind s == Branch && spanName s == label && spanParent s == ownerOf here && thread == thread'
       _ -> False
+  ownerThread here = (\(_, thread, _) -> thread) <$> ownerSpan here
   ownerSpan here = owner here >>= (`Map.lookup` spanOf x) >>= (`Map.lookup` begun x)
   ownerOf here = case owner here of
     Nothing -> Top
@@ -230,15 +274,28 @@ isStopped = \case StoppedBy _ -> True; _ -> False
 -- | The ends of branches, at the times that the specification has been compared with.
 asSpecified :: Indexed -> [String]
 asSpecified x = case seen (record' x) of
-  Right s | complete x, let expected = sort [(t, label) | (t, IsOver label) <- timeline s], expected /= traced -> ["expected " ++ show expected ++ ", but in the trace: " ++ show traced]
+  Right s
+    | complete x
+    , let expected = sort [(t, label) | (t, IsOver label) <- timeline s]
+    , expected /= traced ->
+        ["expected " ++ show expected ++ ", but in the trace: " ++ show traced]
   _ -> []
  where
   -- (A thread emits the end of its branch before it publishes it; others may run between.)
-  traced = sort [(round t, spanName s) | (_, Received True _ (Ended s t _)) <- entries (record' x), spanKind s == Branch, not (isWorker (spanName s))]
+  traced =
+    sort
+      [ (round t, spanName s)
+      | (_, Received True _ (Ended s t _)) <- entries (record' x)
+      , spanKind s == Branch
+      , not (isWorker (spanName s))
+      ]
 
 -- | Whether a branch with this label belongs to a signal; or it is the thread of the whole program.
 isWorker :: String -> Bool
-isWorker label = any (`isInfixOf` label) ["plain thread", ": polling", ": clock", ": staleAfter", ": debounce", ": throttle", ": hysteresis"]
+isWorker label =
+  any
+    (`isInfixOf` label)
+    ["plain thread", ": polling", ": clock", ": staleAfter", ": debounce", ": throttle", ": hysteresis"]
 
 -- | Why each branch was stopped.
 causes :: Indexed -> [String]
@@ -264,7 +321,13 @@ causes x =
     Nothing -> case Map.lookup thread (threadsBranch x) of
       Just s -> possible s cause
       Nothing -> False
-  siblings o = [(at, name, end') | (at, _, s, _, end') <- Map.elems (over x), spanKind s == Branch, spanParent s == Inside (spanNumber o), name <- maybeToList (stripPrefix (spanName o ++ ": ") (spanName s))]
+  siblings o =
+    [ (at, name, end')
+    | (at, _, s, _, end') <- Map.elems (over x)
+    , spanKind s == Branch
+    , spanParent s == Inside (spanNumber o)
+    , name <- maybeToList (stripPrefix (spanName o ++ ": ") (spanName s))
+    ]
   times = Map.fromList [(at, t) | (at, _, _, t, _) <- Map.elems (over x)]
   own s o cause =
     let name = fromMaybe "" (stripPrefix (spanName o ++ ": ") (spanName s))
@@ -272,36 +335,64 @@ causes x =
         others = [(at, n, e) | (at, n, e) <- siblings o, at < endOf']
         finishedNow n = [at | (at, n', e) <- others, n' == n, n' /= name, e == Succeeded]
         failedNow n = [at | (at, n', e) <- others, n' == n, n' /= name, wrong e]
+        begunLater =
+          [ b
+          | (_, _, b) <- Map.elems (begun x)
+          , spanParent b == Inside (spanNumber o)
+          , not (isWorker (spanName b))
+          , any (realToFrac (spanBegan b) >) (Map.lookup endOf' times)
+          ]
         operatorEnd = (\(_, _, _, _, e) -> e) <$> Map.lookup (spanNumber o) (over x)
         program' = snd <$> Map.lookup (spanNumber o) (partOf x)
         -- None to the left of it had ended, or failed, at an earlier time. (At the same time the order of the
         -- events is not that in which the ends were published.)
-        leftmost n ats counts = and [not (Map.lookup at times < Map.lookup at' times && position n' < position n && counts e) | at' <- take 1 ats, (at, n', e) <- others, n' /= name]
+        leftmost n ats counts =
+          not (null ats)
+            && and
+              [ not (Map.lookup at times < Map.lookup at' times && position n' < position n && counts e)
+              | at' <- take 1 ats
+              , (at, n', e) <- others
+              , n' /= name
+              ]
         operatorAgrees ends' = maybe True (\e -> ends' e || isStopped e || isFault e) operatorEnd
      in case (spanName o, cause) of
-          (op, SiblingFinished n) | op `elem` ["parallel", "firstOf"] -> not (null (finishedNow n)) && leftmost n (finishedNow n) (not . isStopped) && operatorAgrees (== Succeeded)
+          (op, SiblingFinished n)
+            | op `elem` ["parallel", "firstOf"] ->
+                leftmost n (finishedNow n) (not . isStopped) && operatorAgrees (== Succeeded)
           (op, SiblingFailed n)
-            | op `elem` ["parallel", "firstOf"] -> not (null (failedNow n)) && leftmost n (failedNow n) (not . isStopped) && operatorAgrees isFailed
-            | op `elem` ["both", "allOf"] -> not (null (failedNow n)) && leftmost n (failedNow n) wrong && operatorAgrees isFailed
-          ("decide", SiblingFinished ns) -> all (\n -> finishedNow n ++ failedNow n /= []) (inList ns) && not (all (null . finishedNow) (inList ns))
+            | op `elem` ["parallel", "firstOf"] ->
+                leftmost n (failedNow n) (not . isStopped) && operatorAgrees isFailed
+            | op `elem` ["both", "allOf"] -> leftmost n (failedNow n) wrong && operatorAgrees isFailed
+          ("decide", SiblingFinished ns) ->
+            all (\n -> finishedNow n ++ failedNow n /= []) (inList ns) && not (all (null . finishedNow) (inList ns))
           ("decide", SiblingFailed ns) -> not (any (null . failedNow) (inList ns))
           ("scoped", SiblingFinished "body") -> not (null (finishedNow "body"))
           ("scoped", SiblingFailed n)
             | n == "body" -> not (null (failedNow n))
-            | Just k <- stripPrefix "fork " n -> any (\(_, n', e) -> n' == "fork" && wrong e) others && read k <= length (filter (\(_, n', _) -> n' == "fork") (siblings o))
+            | Just k <- stripPrefix "fork " n ->
+                any (\(_, n', e) -> n' == "fork" && wrong e) others
+                  && read k <= length (filter (\(_, n', _) -> n' == "fork") (siblings o))
           ("scoped", FromOutside "requestStop") -> name == "fork"
           ("withShared", SiblingFinished n) -> not (null (finishedNow n))
           ("withShared", SiblingFailed n) -> not (null (failedNow n))
           ("timeout", TimeLimit limit) -> case program' of
-            Just (Timeout n _) -> limit == fromIntegral n && maybe False (\(_, _, _, t, _) -> t >= realToFrac (spanBegan o) + fromIntegral n) (Map.lookup (spanNumber s) (over x))
+            Just (Timeout n _) ->
+              let isLate (_, _, _, t, _) = t >= realToFrac (spanBegan o) + fromIntegral n
+               in limit == fromIntegral n && maybe False isLate (Map.lookup (spanNumber s) (over x))
             _ -> False
-          (op, _) | op `notElem` ["parallel", "firstOf", "both", "allOf", "decide", "scoped", "withShared"] -> case cause of
-            SignalChanged n these -> maybe False (\(_, r) -> reactionParent r == Inside (spanNumber o) && reactionOperator r == op && reactionChanges r == these) (Map.lookup n (reacted x))
-            SiblingFinished n -> not (null (finishedNow n))
-            -- Nothing begins after the failure of a sensor. (What had been started begins at the same time, and may even end by itself.)
-            SiblingFailed "sensor" | op /= "timeout" && null [() | (_, _, b) <- Map.elems (begun x), spanParent b == Inside (spanNumber o), not (isWorker (spanName b)), any (realToFrac (spanBegan b) >) (Map.lookup endOf' times)] -> operatorEnd /= Just Succeeded || any (\(_, _, e) -> e == Succeeded) (siblings o)
-            SiblingFailed n -> not (null (failedNow n))
-            _ -> False
+          (op, _)
+            | op `notElem` ["parallel", "firstOf", "both", "allOf", "decide", "scoped", "withShared"] -> case cause of
+                SignalChanged n these ->
+                  let isIts r = reactionParent r == Inside (spanNumber o) && reactionOperator r == op
+                   in maybe False (\(_, r) -> isIts r && reactionChanges r == these) (Map.lookup n (reacted x))
+                SiblingFinished n -> not (null (finishedNow n))
+                -- Nothing begins after the failure of a sensor. (What had been started begins at the same time,
+                -- and may even end by itself.)
+                SiblingFailed "sensor"
+                  | op /= "timeout" && null begunLater ->
+                      operatorEnd /= Just Succeeded || any (\(_, _, e) -> e == Succeeded) (siblings o)
+                SiblingFailed n -> not (null (failedNow n))
+                _ -> False
           _ -> False
   inList = map (filter (/= ' ')) . splitAtCommas
   splitAtCommas text = case break (== ',') text of
@@ -319,16 +410,27 @@ reactionsOf x =
     ++ [ "started by no such reaction: " ++ show s
        | (at, _, s) <- Map.elems (begun x)
        , Just n <- [spanReaction s]
-       , not (maybe False (\(at', r) -> at' < at && spanKind s == Branch && spanParent s == reactionParent r && Just (spanName s) == (((reactionOperator r ++ ": ") ++) <$> reactionStarts r)) (Map.lookup n (reacted x)))
+       , not (maybe False (\(at', r) -> at' < at && hasStarted r s) (Map.lookup n (reacted x)))
        ]
  where
+  hasStarted r s =
+    spanKind s == Branch
+      && spanParent s == reactionParent r
+      && Just (spanName s) == (((reactionOperator r ++ ": ") ++) <$> reactionStarts r)
   each (at, r) = case reactionParent r of
     Inside p
       | Just (_, _, o) <- Map.lookup p (begun x)
       , spanKind o == Operator
       , spanName o == reactionOperator r ->
-          let branches name = [(s, at') | (at', _, s) <- Map.elems (begun x), spanKind s == Branch, spanParent s == Inside p, spanName s == spanName o ++ ": " ++ name]
-           in ["started nothing: " ++ show r | complete x, Just name <- [reactionStarts r], length [s | (s, at') <- branches name, spanReaction s == Just (reactionNumber r), at' > at] /= 1]
+          let branches name =
+                [ (s, at')
+                | (at', _, s) <- Map.elems (begun x)
+                , spanKind s == Branch
+                , spanParent s == Inside p
+                , spanName s == spanName o ++ ": " ++ name
+                ]
+              started name = [s | (s, at') <- branches name, spanReaction s == Just (reactionNumber r), at' > at]
+           in ["started nothing: " ++ show r | complete x, Just name <- [reactionStarts r], length (started name) /= 1]
                 ++ [ "stopped no such branch: " ++ show r
                    | Just b <- [reactionStopped r]
                    , null
@@ -342,8 +444,9 @@ reactionsOf x =
                       , not (isStopped e) || stoppedByIt r e
                       ]
                    ]
-                ++ ["out of time: " ++ show r | reactionTime r < spanBegan o || maybe False (\b -> stoppedAfter b < 0 || stoppingTook b < 0) (reactionStopped r)]
+                ++ ["out of time: " ++ show r | reactionTime r < spanBegan o || any isNegative (reactionStopped r)]
     _ -> ["in no such operator: " ++ show r]
+  isNegative b = stoppedAfter b < 0 || stoppingTook b < 0
   stoppedByIt r = \case
     StoppedBy (SignalChanged n _) -> n == reactionNumber r
     _ -> False
@@ -352,7 +455,13 @@ reactionsOf x =
 values :: Indexed -> [String]
 values x =
   concat
-    [ ["no change of its value: " ++ show r | not (decides p r)] ++ concat [["not the value at that time: " ++ show (r, c) | not (held at r c)] | direct p, c <- reactionChanges r, changeSignal c /= "level"]
+    [ ["no change of its value: " ++ show r | not (decides p r)]
+        ++ [ "not the value at that time: " ++ show (r, c)
+           | direct p
+           , c <- reactionChanges r
+           , changeSignal c /= "level"
+           , not (held at r c)
+           ]
     | (at, r) <- Map.elems (reacted x)
     , Inside n <- [reactionParent r]
     , Just (_, p) <- [Map.lookup n (partOf x)]
@@ -371,7 +480,8 @@ values x =
           _ -> True
     levels -> case p of
       -- (Equal changes are reported once.)
-      TeleoReactive _ -> not (null levels) && (not (direct p) || and [holds (read was) /= holds (read now) | (Just was, now) <- levels])
+      TeleoReactive _ ->
+        not (null levels) && (not (direct p) || and [holds (read was) /= holds (read now) | (Just was, now) <- levels])
       Timeout _ _ -> null levels
       _ -> False
   isTeleoReactive = \case TeleoReactive _ -> True; _ -> False
@@ -391,10 +501,13 @@ values x =
         from = maximum (0 : [at' | (k, (at', _, _)) <- Map.toList (begun x), k < n])
         to = minimum (at : [at' | (k, (at', _, _)) <- Map.toList (begun x), k > n])
         t = round (reactionTime r) :: Int
-     in changeAfter c `elem` [show l | (since, when', until', untilAt, At l) <- history (changeSignal c), since < to, until' > from, when' <= t, untilAt >= t]
-          && maybe True (`elem` [show l | (since, _, _, _, At l) <- history (changeSignal c), since < to]) (changeBefore c)
+        known = [one | one@(since, _, _, _, _) <- history (changeSignal c), since < to]
+        current = [show l | (_, when', until', untilAt, At l) <- known, until' > from, when' <= t, untilAt >= t]
+     in changeAfter c `elem` current && maybe True (`elem` [show l | (_, _, _, _, At l) <- known]) (changeBefore c)
   -- When a condition had which level: places in the record, and times.
   history condition =
-    let sets = (-1, 0, fromMaybe NoValue (lookup condition (conditions (world (record' x))))) : [(at, t, l) | ((at, c, l), t) <- zip [(at, c, l) | (at, IsSet c l) <- es] times, c == condition]
+    let first = fromMaybe NoValue (lookup condition (conditions (world (record' x))))
+        later = [(at, t, l) | ((at, c, l), t) <- zip [(at, c, l) | (at, IsSet c l) <- es] times, c == condition]
+        sets = (-1, 0, first) : later
         times = scanl1 max [t | Program.Change t _ _ <- changes (world (record' x))]
      in zipWith (\(at, t, l) (at', t', _) -> (at, t, at', t', l)) sets (drop 1 sets ++ [(maxBound, maxBound, NoValue)])

@@ -38,7 +38,8 @@ receiving = do
 
   it "receives them also if the behaviour throws" $ do
     seen <- newIORef []
-    (withTraceOptions patient [Batches (\batch -> modifyIORef' seen (++ batch))] (named "a" failed) :: IO ()) `shouldThrow` (== Failed)
+    (withTraceOptions patient [Batches (\batch -> modifyIORef' seen (++ batch))] (named "a" failed) :: IO ())
+      `shouldThrow` (== Failed)
     map isEnd <$> readIORef seen `shouldReturn` [False, True]
 
   it "receives texts that were evaluated, and cut if they are long; what they throw is named" $ do
@@ -53,15 +54,21 @@ receiving = do
     drop 1 found `shouldBe` ["<its text throws an exception>"]
 
   it "receives a reaction, whatever the names of its signals and the texts of their values are" $
-    for_ [(throw (Fault "no text"), "<its text"), ('a' : throw (Fault "no text"), "a<its text"), (cycle "ab", "abab")] $ \(text, expected) -> do
-      seen <- newIORef []
-      held <- newTVarIO True
-      let finger = Signal.namedWith text (const text) (Signal.watching (readTVar held))
-          letGo = (\left right -> not (left && right)) <$> finger <*> finger
-      withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] $
-        Signal.insteadWhen letGo (pure ()) (atomically (writeTVar held False) >> hang)
-      found <- readIORef seen
-      [map (take (length expected)) [changeSignal c, changeAfter c] | Reacted r <- found, c <- reactionChanges r] `shouldBe` [[expected, expected]]
+    for_
+      [ (throw (Fault "no text"), "<its text")
+      , ('a' : throw (Fault "no text"), "a<its text")
+      , (cycle "ab", "abab")
+      ]
+      $ \(text, expected) -> do
+        seen <- newIORef []
+        held <- newTVarIO True
+        let finger = Signal.namedWith text (const text) (Signal.watching (readTVar held))
+            letGo = (\left right -> not (left && right)) <$> finger <*> finger
+        withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] $
+          Signal.insteadWhen letGo (pure ()) (atomically (writeTVar held False) >> hang)
+        found <- readIORef seen
+        [map (take (length expected)) [changeSignal c, changeAfter c] | Reacted r <- found, c <- reactionChanges r]
+          `shouldBe` [[expected, expected]]
 
   it "receives the number of those that it lost, in their place: accepted and lost are all" $ do
     (received, lost) <- counting
@@ -103,22 +110,27 @@ blocking = do
 
 throwing' :: Spec
 throwing' = do
-  for_ [("an exception", toException (Fault "disk")), ("an asynchronous exception", toException ThreadKilled)] $ \(what, e) ->
-    it ("receives nothing more, is reported once, and does not disturb the others: " ++ what) $
-      reporting $ \reports -> do
-        (received, lost) <- counting
-        tried <- newIORef (0 :: Int)
-        withTraceOptions patient [EachEvent (\_ -> modifyIORef' tried (+ 1) >> throwIO e), EachEvent (count received lost)] (spans 1000)
-        readIORef received `shouldReturn` 2000
-        readIORef tried `shouldReturn` 1
-        told <- reports
-        [show thrown | SinkThrew thrown <- told] `shouldBe` [show e]
+  for_ [("an exception", toException (Fault "disk")), ("an asynchronous exception", toException ThreadKilled)] $
+    \(what, e) ->
+      it ("receives nothing more, is reported once, and does not disturb the others: " ++ what) $
+        reporting $ \reports -> do
+          (received, lost) <- counting
+          tried <- newIORef (0 :: Int)
+          withTraceOptions
+            patient
+            [EachEvent (\_ -> modifyIORef' tried (+ 1) >> throwIO e), EachEvent (count received lost)]
+            (spans 1000)
+          readIORef received `shouldReturn` 2000
+          readIORef tried `shouldReturn` 1
+          told <- reports
+          [show thrown | SinkThrew thrown <- told] `shouldBe` [show e]
 
 simulated :: Spec
 simulated = do
   it "receives events with virtual times" $ do
     seen <- newIORef []
-    _ <- simulateWith defaultSimOptions (withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] (named "sleep" (sleep 3600)))
+    let traced = withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] (named "sleep" (sleep 3600))
+    _ <- simulateWith defaultSimOptions traced
     times <- readIORef seen
     [(spanBegan s, t) | Ended s t _ <- times] `shouldBe` [(0, 3600)]
 
@@ -126,10 +138,15 @@ simulated = do
     reporting $ \_ ->
       for_ [1 .. 100] $ \seed -> do
         never <- newEmptyMVar
-        let mission traced = traced (named "a" (both (named "b" (sleep 1 >> sleep 1)) (named "c" (sleep 1.5))) >> (named "d" failed ? sleep 1))
+        let mission traced =
+              traced $
+                named "a" (both (named "b" (sleep 1 >> sleep 1)) (named "c" (sleep 1.5)))
+                  >> (named "d" failed ? sleep 1)
             run traced = simulateWith defaultSimOptions {Sim.scheduled = Sim.Seeded seed} (mission traced)
             summary r = (explain (outcome r), finished r, runPoints r, runSchedule r)
-            sinks = [EachEvent (\_ -> throwIO (Fault "sink")), EachEvent (\_ -> pure ())] ++ [EachEvent (\_ -> takeMVar never) | seed == 7]
+            sinks =
+              [EachEvent (\_ -> throwIO (Fault "sink")), EachEvent (\_ -> pure ())]
+                ++ [EachEvent (\_ -> takeMVar never) | seed == 7]
         plain <- run id
         traced <- run (withTraceOptions defaultTraceOptions {waitAtEnd = 0.1} sinks)
         summary traced `shouldBe` summary plain
@@ -158,7 +175,8 @@ count received _ _ = modifyIORef' received (+ 1)
 reporting :: (IO [SinkProblem] -> IO a) -> IO a
 reporting test = do
   told <- newIORef []
+  let tell e = for_ (fromException e) (\problem -> modifyIORef' told (problem :))
   bracket
-    (getUncaughtExceptionHandler <* setUncaughtExceptionHandler (\e -> for_ (fromException e) (\problem -> modifyIORef' told (problem :))))
+    (getUncaughtExceptionHandler <* setUncaughtExceptionHandler tell)
     setUncaughtExceptionHandler
     (\_ -> test (reverse <$> readIORef told))

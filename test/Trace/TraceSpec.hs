@@ -45,13 +45,15 @@ naming = do
         traced act = if isOn then withTrace [] act else act
     it "gives the result, and throws what the behaviour throws" $ do
       traced (named "n" (pure 'a')) `shouldReturn` 'a'
-      ending (traced (named "n" (throwIO (Fault "bug") :: IO Char))) `shouldReturn` Support.FaultedWith (show (Fault "bug"))
+      ending (traced (named "n" (throwIO (Fault "bug") :: IO Char)))
+        `shouldReturn` Support.FaultedWith (show (Fault "bug"))
       traced (named "n" (failWith "locked" :: IO ())) `shouldThrow` (== FailedBecause "locked")
       traced (named "n" (throwIO (Cancel "caller") :: IO ())) `shouldThrow` (== Cancel "caller")
 
     it "keeps the caller's masking state" $
-      for_ [(id, Unmasked), (mask_, MaskedInterruptible), (uninterruptibleMask_, MaskedUninterruptible)] $ \(inState, state) ->
-        inState (traced (named "n" (named "m" getMaskingState))) `shouldReturn` state
+      for_ [(id, Unmasked), (mask_, MaskedInterruptible), (uninterruptibleMask_, MaskedUninterruptible)] $
+        \(inState, state) ->
+          inState (traced (named "n" (named "m" getMaskingState))) `shouldReturn` state
 
   it "is a tail call without a trace: a million, one in the other, in constant memory" $
     inConstantMemory 1000000 $ \step ->
@@ -95,7 +97,8 @@ parents = do
       named "task" (Support.open begun >> hang) `finally` named "cleanup" (pure ()) ||| pass begun
       named "try" failed ? named "recover" (pure ())
       timeout 0.001 (hang `onException` cleanupWithin 1 (named "park" (pure ()))) ? pure ()
-    for_ ["read", "task", "cleanup", "try", "recover", "park"] $ \name -> parentsOf seen `shouldContain` [(name, Just "outer")]
+    for_ ["read", "task", "cleanup", "try", "recover", "park"] $ \name ->
+      parentsOf seen `shouldContain` [(name, Just "outer")]
     checkSpans seen
 
   it "is that of the scope, for what is forked" $ do
@@ -107,7 +110,8 @@ parents = do
   it "is right in operators within operators" $ do
     let nest = foldr (\n inner -> named ("level " ++ show n) (inner ||| hang)) (pure ()) [1 .. 10 :: Int]
     (_, seen) <- traceOf nest
-    parentsOf seen `shouldBe` [("level " ++ show n, if n == 1 then Nothing else Just ("level " ++ show (n - 1))) | n <- [1 .. 10 :: Int]]
+    let parent n = if n == 1 then Nothing else Just ("level " ++ show (n - 1))
+    parentsOf seen `shouldBe` [("level " ++ show n, parent n) | n <- [1 .. 10 :: Int]]
     checkSpans seen
 
   it "is unknown in a thread that this library does not start, unless it is adopted" $ do
@@ -126,9 +130,11 @@ parents = do
   it "is in the trace around it, of two that are made at the same time" $ do
     inOne <- newGate
     inOther <- newGate
-    let half mine theirs name = snd <$> traceOf (named name (Support.open mine >> pass theirs >> named (name ++ "'s") (pure ())))
+    let half mine theirs name =
+          snd <$> traceOf (named name (Support.open mine >> pass theirs >> named (name ++ "'s") (pure ())))
     seen <- allOf [half inOne inOther "one", half inOther inOne "other"]
-    map parentsOf seen `shouldBe` [[("one", Nothing), ("one's", Just "one")], [("other", Nothing), ("other's", Just "other")]]
+    map parentsOf seen
+      `shouldBe` [[("one", Nothing), ("one's", Just "one")], [("other", Nothing), ("other's", Just "other")]]
 
   it "is in both traces, of a trace inside another" $ do
     inner <- newIORef []
@@ -146,16 +152,43 @@ parents = do
 causes :: Spec
 causes = do
   cause "the left sibling finished" (\begun stoppable -> pass begun ||| stoppable) (SiblingFinished "left")
-  cause "the right sibling failed" (\begun stoppable -> both stoppable (pass begun >> failed) ? pure ()) (SiblingFailed "right")
+  cause
+    "the right sibling failed"
+    (\begun stoppable -> both stoppable (pass begun >> failed) ? pure ())
+    (SiblingFailed "right")
   cause "the third sibling finished" (\begun stoppable -> firstOf [stoppable, hang, pass begun]) (SiblingFinished "3")
-  cause "the second sibling failed" (\begun stoppable -> void (allOf [stoppable, pass begun >> failed]) ? pure ()) (SiblingFailed "2")
+  cause
+    "the second sibling failed"
+    (\begun stoppable -> void (allOf [stoppable, pass begun >> failed]) ? pure ())
+    (SiblingFailed "2")
   cause "a time limit" (\_ stoppable -> timeout 0.1 stoppable ? pure ()) (TimeLimit 0.1)
-  cause "decide was certain because of a result" (\begun stoppable -> decide (\ends -> pure () <$ listToMaybe [() | Just (Right ()) <- ends]) [stoppable, pass begun, hang]) (SiblingFinished "2")
-  cause "decide was certain because of a failure" (\begun stoppable -> decide (\ends -> pure () <$ listToMaybe [() | Just (Left _) <- ends]) [stoppable, hang, pass begun >> failed]) (SiblingFailed "3")
-  cause "what is forked ends with its scope" (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >> pass begun)) (SiblingFinished "body")
-  cause "requestStop" (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >>= \c -> pass begun >> requestStop c >> untilStopped c)) (FromOutside "requestStop")
-  cause "a cancellation from outside, also deep inside" (\begun stoppable -> cancelledFrom begun (both hang (firstOf [stoppable]))) (FromOutside (show (Cancel "user")))
-  cause "the outermost reason, for what is nested" (\_ stoppable -> timeout 0.1 (both hang (firstOf [stoppable])) ? pure ()) (TimeLimit 0.1)
+  let onResult ends = listToMaybe [pure () | Just (Right ()) <- ends]
+      onFailure ends = listToMaybe [pure () | Just (Left _) <- ends]
+  cause
+    "decide was certain because of a result"
+    (\begun stoppable -> decide onResult [stoppable, pass begun, hang])
+    (SiblingFinished "2")
+  cause
+    "decide was certain because of a failure"
+    (\begun stoppable -> decide onFailure [stoppable, hang, pass begun >> failed])
+    (SiblingFailed "3")
+  cause
+    "what is forked ends with its scope"
+    (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >> pass begun))
+    (SiblingFinished "body")
+  let stopped begun c = pass begun >> requestStop c >> untilStopped c
+  cause
+    "requestStop"
+    (\begun stoppable -> scoped (\nursery -> fork nursery stoppable >>= stopped begun))
+    (FromOutside "requestStop")
+  cause
+    "a cancellation from outside, also deep inside"
+    (\begun stoppable -> cancelledFrom begun (both hang (firstOf [stoppable])))
+    (FromOutside (show (Cancel "user")))
+  cause
+    "the outermost reason, for what is nested"
+    (\_ stoppable -> timeout 0.1 (both hang (firstOf [stoppable])) ? pure ())
+    (TimeLimit 0.1)
 
   it "a signal changed: with the values that the operator read" $ do
     level <- newTVarIO (100 :: Int)
@@ -163,14 +196,18 @@ causes = do
         low = Signal.named "battery low" ((< 10) <$> battery)
     (_, seen) <- traceOf $ Signal.insteadWhen low (pure ()) (named "drive" (atomically (writeTVar level 9) >> hang))
     [c | Ended s _ (StoppedBy c) <- seen, spanName s == "drive"]
-      `shouldBe` [SignalChanged (reactionIn seen) [Change "battery" (Just "100") "9", Change "battery low" (Just "False") "True"]]
+      `shouldBe` [ SignalChanged
+                    (reactionIn seen)
+                    [Change "battery" (Just "100") "9", Change "battery low" (Just "False") "True"]
+                 ]
 
   it "it was abandoned, and what begins in it later has no parent" $ do
     mayEnd <- newGate
     over <- newGate
     living <- liveThreadCount
     (_, seen) <- traceOf . named "outer" $ do
-      timeout 0.001 (abandoning 0.001 (uninterruptibleMask_ (named "stuck" (named "deep" (pass mayEnd)) >> named "later" (pure ()) >> Support.open over)))
+      let stuck = named "stuck" (named "deep" (pass mayEnd)) >> named "later" (pure ()) >> Support.open over
+      timeout 0.001 (abandoning 0.001 (uninterruptibleMask_ stuck))
         ? pure ()
       Support.open mayEnd
       pass over
@@ -203,7 +240,9 @@ causes = do
       begun <- newGate
       (_, seen) <- traceOf (act begun (named "stoppable" (Support.open begun >> hang)))
       [c | Ended s _ (StoppedBy c) <- seen, spanName s == "stoppable"] `shouldBe` [expected]
-  untilNotRunning thread = threadStatus thread >>= \status -> if status == ThreadRunning then yield >> untilNotRunning thread else pure ()
+  untilNotRunning thread =
+    threadStatus thread >>= \status ->
+      if status == ThreadRunning then yield >> untilNotRunning thread else pure ()
   untilStopped child = atomically (void (tryAwait child >>= maybe retry pure))
   cancelledFrom begun act = try (cancellingSelf (pass begun) act) >>= either (\(Cancel _) -> pure ()) pure
 
@@ -211,7 +250,8 @@ causes = do
 receivedBy :: (Trace -> Trace) -> (Event -> IO ()) -> Behavior a -> Behavior a
 receivedBy change receive act = withTrace [] $ do
   place <- myPlace >>= maybe (throwIO (Fault "there is no trace")) pure
-  mask $ \restore -> inPlace (Just place {trace = withReceiver (Receiver 1 False receive) (change (trace place))}) (restore act)
+  mask $ \restore ->
+    inPlace (Just place {trace = withReceiver (Receiver 1 False receive) (change (trace place))}) (restore act)
 
 reactions :: Spec
 reactions = do
@@ -219,7 +259,9 @@ reactions = do
     level <- newTVarIO (100 :: Int)
     let low = Signal.named "low" ((< 10) <$> Signal.watching (readTVar level))
         recharge = named "recharge" (atomically (writeTVar level 100))
-        drive = named "drive" (atomically (readTVar level >>= \n -> n <$ writeTVar level 5) >>= \n -> if n == 100 then hang else pure ())
+        drive = named "drive" $ do
+          n <- atomically (readTVar level <* writeTVar level 5)
+          if n == 100 then hang else pure ()
     once <- newTVarIO False
     let task = readTVarIO once >>= \again -> if again then pure () else atomically (writeTVar once True) >> drive
     (_, seen) <- traceOf (named "mission" (Signal.monitor low recharge task))
@@ -229,13 +271,15 @@ reactions = do
                  , ("monitor", [Change "low" (Just "True") "False"], Nothing, Just "task")
                  ]
     [spanReaction s | Began s <- seen, spanName s == "recharge"] `shouldBe` map (Just . reactionNumber) (take 1 found)
-    [reactionParent r | r <- found] `shouldBe` [Inside n | _ <- found, Began s <- seen, spanName s == "mission", let n = spanNumber s]
+    [reactionParent r | r <- found]
+      `shouldBe` [Inside n | _ <- found, Began s <- seen, spanName s == "mission", let n = spanNumber s]
 
   it "reaches all receivers, whatever interrupts the operator: they are called masked" $ do
     states <- newIORef []
     low <- newTVarIO False
     receivedBy id (const (getMaskingState >>= \state -> modifyIORef' states (state :))) $
-      Signal.insteadWhen (Signal.watching (readTVar low)) (named "land" (pure ())) (named "fly" (atomically (writeTVar low True) >> hang))
+      let fly = named "fly" (atomically (writeTVar low True) >> hang)
+       in Signal.insteadWhen (Signal.watching (readTVar low)) (named "land" (pure ())) fly
     length <$> readIORef states `shouldReturn` 5
     readIORef states >>= (`shouldSatisfy` notElem Unmasked)
 
@@ -246,18 +290,23 @@ reactions = do
     -- The clock is read by the operator, before it stops the branch and after that.
     let clock = readIORef stopped >>= \is -> if is then myThreadId >>= (`throwTo` Cancel "caller") else pure ()
         fly = (atomically (writeTVar low True) >> hang) `finally` writeIORef stopped True
-    receivedBy (\t -> t {traceClock = 0 <$ clock}) (\event -> modifyIORef' seen (event :)) (Signal.insteadWhen (Signal.watching (readTVar low)) (pure ()) fly)
+    receivedBy
+      (\t -> t {traceClock = 0 <$ clock})
+      (\event -> modifyIORef' seen (event :))
+      (Signal.insteadWhen (Signal.watching (readTVar low)) (pure ()) fly)
       `shouldThrow` (== Cancel "caller")
     found <- readIORef seen
     [reactionOperator r | Reacted r <- found] `shouldBe` ["insteadWhen"]
 
   it "is not reported when an operator only begins" $ do
-    (_, seen) <- traceOf (Signal.monitor (pure False) (pure ()) (pure ()) >> Signal.rSelect (pure True) (pure ()) (pure ()))
+    (_, seen) <-
+      traceOf (Signal.monitor (pure False) (pure ()) (pure ()) >> Signal.rSelect (pure True) (pure ()) (pure ()))
     [() | Reacted _ <- seen] `shouldBe` []
 
   it "is reported when an operator ends at its first reading" $ do
     (_, seen) <- traceOf (Signal.waitUntil (Signal.named "calm" (pure True)))
-    [(reactionChanges r, reactionStopped r, reactionStarts r) | Reacted r <- seen] `shouldBe` [([Change "calm" Nothing "True"], Nothing, Nothing)]
+    [(reactionChanges r, reactionStopped r, reactionStarts r) | Reacted r <- seen]
+      `shouldBe` [([Change "calm" Nothing "True"], Nothing, Nothing)]
 
   it "has the values of the transaction that decided, whatever changes them afterwards" $
     for_ [1 .. 200] $ \seed -> do
@@ -267,45 +316,71 @@ reactions = do
             set = atomically . writeTVar level
             later n = sleep 1 >> set n >> sleep 9
         firstOf [Signal.rSelect high (sleep 9) (sleep 9), later 1, later 0, later 2, later 0]
-      [c | Reacted r <- events run, c <- reactionChanges r, (changeBefore c == Just "0") == (changeAfter c == "0")] `shouldBe` []
+      [c | Reacted r <- events run, c <- reactionChanges r, (changeBefore c == Just "0") == (changeAfter c == "0")]
+        `shouldBe` []
 
   it "shows two signals of the same name, each with its own values" $ do
     left <- newTVarIO (1 :: Int)
     right <- newTVarIO (2 :: Int)
     let wheel = Signal.named "wheel" . Signal.watching . readTVar
         bothStopped = (\l r -> l == 0 && r == 0) <$> wheel left <*> wheel right
-    (_, seen) <- traceOf (Signal.insteadWhen bothStopped (pure ()) (atomically (mapM_ (`writeTVar` 0) [left, right]) >> hang))
+    let changing = atomically (mapM_ (`writeTVar` 0) [left, right]) >> hang
+    (_, seen) <- traceOf (Signal.insteadWhen bothStopped (pure ()) changing)
     [reactionChanges r | Reacted r <- seen] `shouldBe` [[Change "wheel" (Just "1") "0", Change "wheel" (Just "2") "0"]]
 
   it "gives a condition without a name a name" $ do
     level <- newTVarIO False
-    (_, seen) <- traceOf (Signal.insteadWhen (Signal.watching (readTVar level)) (pure ()) (atomically (writeTVar level True) >> hang))
+    let changing = atomically (writeTVar level True) >> hang
+    (_, seen) <- traceOf (Signal.insteadWhen (Signal.watching (readTVar level)) (pure ()) changing)
     [reactionChanges r | Reacted r <- seen] `shouldBe` [[Change "condition" (Just "False") "True"]]
 
   it "shows names and values also of signals that were shared before the trace began" $
-    for_ [("a signal", id), ("a filter", Signal.debounce 0), ("a filter that remembers", fmap (> 0) . Signal.changes)] $ \(_ :: String, filtered) -> do
-      let watched level = Signal.named "low" (filtered ((< 10) <$> Signal.named "battery" (Signal.watching (readTVar level))))
-          drive level low = Signal.insteadWhen low (pure ()) (atomically (writeTVar level 5) >> hang)
-          changed (_, seen) = [reactionChanges r | Reacted r <- seen]
-      level <- newTVarIO (100 :: Int)
-      inside <- changed <$> Signal.withShared (watched level) (traceOf . drive level)
-      atomically (writeTVar level 100)
-      around' <- changed <$> traceOf (Signal.withShared (watched level) (drive level))
-      inside `shouldBe` [[Change "battery" (Just "100") "5", Change "low" (Just "False") "True"]]
-      around' `shouldBe` inside
+    for_
+      [ ("a signal", id)
+      , ("a filter", Signal.debounce 0)
+      , ("a filter that remembers", fmap (> 0) . Signal.changes)
+      ]
+      $ \(_ :: String, filtered) -> do
+        let watched level =
+              Signal.named "low" (filtered ((< 10) <$> Signal.named "battery" (Signal.watching (readTVar level))))
+            drive level low = Signal.insteadWhen low (pure ()) (atomically (writeTVar level 5) >> hang)
+            changed (_, seen) = [reactionChanges r | Reacted r <- seen]
+        level <- newTVarIO (100 :: Int)
+        inside <- changed <$> Signal.withShared (watched level) (traceOf . drive level)
+        atomically (writeTVar level 100)
+        around' <- changed <$> traceOf (Signal.withShared (watched level) (drive level))
+        inside `shouldBe` [[Change "battery" (Just "100") "5", Change "low" (Just "False") "True"]]
+        around' `shouldBe` inside
 
   it "names of ordered rules those whose conditions have changed, and decide" $ do
     run <- simulateWith defaultSimOptions $ do
       danger <- newTVarIO (0 :: Int)
       order <- newTVarIO 0
       rain <- newTVarIO 0
-      let rule name variable = Signal.named name ((> 0) <$> Signal.named (name ++ " level") (Signal.watching (readTVar variable)))
-          changing = for_ [[(order, 1)], [(rain, 5), (danger, 1)], [(order, 2), (rain, 7)], [(danger, 0)], [(order, 0)], [(rain, 0)]] $ \sets ->
+      let rule name variable =
+            Signal.named name ((> 0) <$> Signal.named (name ++ " level") (Signal.watching (readTVar variable)))
+          steps =
+            [ [(order, 1)]
+            , [(rain, 5), (danger, 1)]
+            , [(order, 2), (rain, 7)]
+            , [(danger, 0)]
+            , [(order, 0)]
+            , [(rain, 0)]
+            ]
+          changing = for_ steps $ \sets ->
             sleep 1 >> atomically (traverse_ (uncurry writeTVar) sets)
-      Signal.teleoReactive [(rule "danger" danger, hang), (rule "order" order, hang), ((> 0) <$> Signal.watching (readTVar rain), hang), (pure True, hang)]
+      Signal.teleoReactive
+        [ (rule "danger" danger, hang)
+        , (rule "order" order, hang)
+        , ((> 0) <$> Signal.watching (readTVar rain), hang)
+        , (pure True, hang)
+        ]
         ||| (changing >> sleep 1)
     let changedTo :: String -> Int -> Int -> [Change]
-        changedTo name was now = [Change (name ++ " level") (Just (show was)) (show now), Change name (Just (show (was > 0))) (show (now > 0))]
+        changedTo name was now =
+          [ Change (name ++ " level") (Just (show was)) (show now)
+          , Change name (Just (show (was > 0))) (show (now > 0))
+          ]
     [(reactionChanges r, reactionStarts r) | Reacted r <- events run]
       `shouldBe` [ (changedTo "order" 0 1, Just "rule 2")
                  , (changedTo "danger" 0 1, Just "rule 1")

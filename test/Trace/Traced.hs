@@ -55,7 +55,11 @@ spanMistakes seen =
     ++ [show s ++ " ended " ++ show n ++ " times" | (s, n) <- counted [spanNumber s | Ended s _ _ <- seen], n /= 1]
     ++ ["did not end: " ++ spanName s | Began s <- seen, IntMap.notMember (spanNumber s) ends]
     ++ ["did not begin: " ++ spanName s | Ended s _ _ <- seen, IntMap.notMember (spanNumber s) begins]
-    ++ ["differs at its end: " ++ spanName s | (_, Ended s _ _) <- numbered, Just (_, s') <- [IntMap.lookup (spanNumber s) begins], s /= s']
+    ++ [ "differs at its end: " ++ spanName s
+       | (_, Ended s _ _) <- numbered
+       , Just (_, s') <- [IntMap.lookup (spanNumber s) begins]
+       , s /= s'
+       ]
     ++ concat [outside s at parent | (at, Began s) <- numbered, Inside parent <- [spanParent s]]
     ++ ["ended before it began: " ++ spanName s | Ended s t _ <- seen, t < spanBegan s]
  where
@@ -63,7 +67,10 @@ spanMistakes seen =
   begins = IntMap.fromList [(spanNumber s, (at, s)) | (at, Began s) <- numbered]
   ends = IntMap.fromList [(spanNumber s, (at, t)) | (at, Ended s t _) <- numbered]
   counted ns = IntMap.toList (IntMap.fromListWith (+) [(n, 1 :: Int) | n <- ns])
-  outside s at parent = case (IntMap.lookup parent begins, IntMap.lookup parent ends, IntMap.lookup (spanNumber s) ends) of
+  outside s at parent =
+    case (IntMap.lookup parent begins, IntMap.lookup parent ends, IntMap.lookup (spanNumber s) ends) of
     (Just (begunAt, p), Just (endAt, endTime), Just (childEnd, childTime)) ->
-      [spanName s ++ " is not within " ++ spanName p | at < begunAt || childEnd > endAt || spanBegan s < spanBegan p || childTime > endTime]
+      [ spanName s ++ " is not within " ++ spanName p
+      | at < begunAt || childEnd > endAt || spanBegan s < spanBegan p || childTime > endTime
+      ]
     _ -> [spanName s ++ " has a parent that is not there"]
