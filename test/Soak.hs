@@ -18,8 +18,6 @@ import System.Exit (die, exitFailure)
 import System.IO (BufferMode (..), hSetBuffering, stdout)
 import Test.QuickCheck (Args (..), Property, isSuccess, numTests, quickCheckWithResult, stdArgs)
 
-import Promises.Broken
-import Promises.Language (sound)
 import Promises.Properties
 import Promises.Stage
 import Promises.Trying
@@ -41,8 +39,6 @@ main = do
         let covered = total <> tried
         putStrLn ("-- after " ++ show n ++ " rounds and " ++ secs spent ++ ": " ++ show covered)
         when (spent < seconds) (rounds (n + 1) covered)
-  putStrLn "-- broken operators: the number of schedules until each is rejected, on average of 20 seeds"
-  forM_ mutants reject
   rounds (1 :: Int) mempty
 
 -- | The n-th round, whose programs and schedules are new.
@@ -52,9 +48,9 @@ oneRound n = do
   promised' <- forM promises $ \promise -> do
     putStrLn (promised promise)
     (<>)
-      <$> timed "random schedules" (underRandom (1 + 5000 * (n - 1)) 100000 sound promise)
-      <*> timed "all schedules with up to two pre-emptions" (underAll (1 + 300 * (n - 1)) 2 100000 300 sound promise)
-      <* timed "in reality, 500 programs" (inReality (1 + 500 * (n - 1)) 500 sound promise)
+      <$> timed "random schedules" (underRandom (1 + 5000 * (n - 1)) 100000 promise)
+      <*> timed "all schedules with up to two pre-emptions" (underAll (1 + 300 * (n - 1)) 2 100000 300 promise)
+      <* timed "in reality, 500 programs" (inReality (1 + 500 * (n - 1)) 500 promise)
   putStrLn "The specification"
   checks "random programs, each run a path of the relation" 100000 onlyWhatIsAllowed
   checks "small programs, both sets of outcomes equal" 500 allThatIsAllowed
@@ -81,13 +77,3 @@ timed name act = do
 
 secs :: Double -> String
 secs t = showFFloat (Just 1) t " s"
-
--- | Prints after how many schedules a broken operator is rejected.
-reject :: Mutant -> IO ()
-reject mutant = do
-  numbers <- catMaybes <$> traverse (\seed -> firstRejection 20000 seed (spoken mutant) (breaks mutant)) [1 .. 20]
-  let mean = sum numbers `div` max 1 (length numbers)
-  putStrLn ("  " ++ padded (show mean) ++ "  " ++ what mutant ++ " (" ++ promised (breaks mutant) ++ ")")
-  unless (length numbers == 20) $ putStrLn "not rejected with every seed" >> exitFailure
- where
-  padded text = replicate (6 - length text) ' ' ++ text

@@ -23,10 +23,11 @@ import Control.Monad (unless, void, when)
 import Data.Maybe (fromMaybe, listToMaybe)
 import Test.QuickCheck (Gen, choose, elements, frequency, vectorOf)
 
-import Behavior.Internal.Failure (Behavior, BehaviorFailed, isCancellation)
-import Behavior.Internal.Runtime (atomically)
-import Promises.Language (Language)
-import qualified Promises.Language as L
+import Behavior (Behavior, BehaviorFailed, attempt, both, failingOn, fallback, parallel)
+import Behavior.Internal.Failure (isCancellation)
+import qualified Behavior.Parallel as Parallel
+import qualified Behavior.Signal as Signal
+import Behavior.Time (atomically, timeout)
 import Promises.Stage
 import Support (Cancel (..), Ending (..), hang)
 
@@ -75,8 +76,8 @@ levels size = do
 
 -- | The operator that stops its branch continues after the stop. The operators inside do not
 -- continue, not even with a fallback; those around it are not affected.
-stoppedAtItsOwnLevel :: Stage -> Language -> Levels -> IO ()
-stoppedAtItsOwnLevel stage l (Levels these) = do
+stoppedAtItsOwnLevel :: Stage -> Levels -> IO ()
+stoppedAtItsOwnLevel stage (Levels these) = do
   inside <- newTVarIO False
   continued <- newLog
   let bottom = (atomically (writeTVar inside True) >> hang) `catch` \e -> pause stage 1 >> throwIO (e :: SomeException)
@@ -85,22 +86,22 @@ stoppedAtItsOwnLevel stage l (Levels these) = do
       build n (level : further) =
         let act = build (n + 1) further
          in (level `doing` (act `fallingBack` n)) >> when (isStop level) (append continued n)
-      fallingBack act n = L.fallback l act (append continued (100 + n :: Int))
+      fallingBack act n = fallback act (append continued (100 + n :: Int))
       doing level act = case level of
-        Around InParallel -> L.parallel l act hang
-        Around InBoth -> L.both l (pure ()) act
-        Around InFirst -> L.firstOf l [act, hang]
-        Around InAll -> void (L.allOf l [act, pure ()])
-        Around InDecision -> L.decide l firstEnd [act, hang]
-        Around InSelect -> L.rSelect l (pure False) hang act
-        Around InTask -> L.monitor l (pure False) hang act
-        Around InHolding -> L.whileHolding l (pure True) act
-        Around InTimeout -> L.timeout l (fromIntegral untilStopped * tick stage) act
-        Around InAttempt -> L.attempt l 3 act
-        Around InFailing -> L.failing l act
-        Around InScope -> L.beside l [hang] act
-        ByNeighbour -> L.parallel l act (atomically (readTVar inside >>= check))
-        ByTimeout n -> L.fallback l (L.timeout l (fromIntegral n * tick stage) act) (pure ())
+        Around InParallel -> parallel act hang
+        Around InBoth -> both (pure ()) act
+        Around InFirst -> Parallel.firstOf [act, hang]
+        Around InAll -> void (Parallel.allOf [act, pure ()])
+        Around InDecision -> Parallel.decide firstEnd [act, hang]
+        Around InSelect -> Signal.rSelect (pure False) hang act
+        Around InTask -> Signal.monitor (pure False) hang act
+        Around InHolding -> Signal.whileHolding (pure True) act
+        Around InTimeout -> timeout (fromIntegral untilStopped * tick stage) act
+        Around InAttempt -> attempt 3 act
+        Around InFailing -> failingOn (const True :: SomeException -> Bool) act
+        Around InScope -> beside [hang] act
+        ByNeighbour -> parallel act (atomically (readTVar inside >>= check))
+        ByTimeout n -> fallback (timeout (fromIntegral n * tick stage) act) (pure ())
       whole
         | stops = calling stage pure [] (build 0 these)
         | otherwise =
@@ -158,8 +159,8 @@ groups size = do
 
 -- | Each branch that receives its stop request waits, uninterruptibly, until all have. If the
 -- operator stopped one after the other, this would never end.
-stoppedTogether :: Stage -> Language -> Group -> IO ()
-stoppedTogether stage l (Group composition handlings cause) = do
+stoppedTogether :: Stage -> Group -> IO ()
+stoppedTogether stage (Group composition handlings cause) = do
   inside <- newTVarIO (0 :: Int)
   received <- newTVarIO (0 :: Int)
   let n = length handlings
@@ -177,19 +178,19 @@ stoppedTogether stage l (Group composition handlings cause) = do
       others = map member handlings
       culprit = [allInside >> void (finish 0 Fails) | cause == ByFailure]
       together = case (composition, others ++ culprit) of
-        (AsAll, these) -> void (L.allOf l these)
-        (AsDecision, these) -> L.decide l firstEnd these
-        (AsPair, [a, b]) -> L.both l a b
-        (AsRace, [a, b]) -> L.parallel l a b
-        (AsForks, a : these) -> L.beside l these a
+        (AsAll, these) -> void (Parallel.allOf these)
+        (AsDecision, these) -> Parallel.decide firstEnd these
+        (AsPair, [a, b]) -> both a b
+        (AsRace, [a, b]) -> parallel a b
+        (AsForks, a : these) -> beside these a
         (AsTaskAndSensor, [a, b]) -> do
           readings <- newTVarIO (0 :: Int)
           -- The task starts by the first reading; the second reading is the other member.
           let reading = do
                 k <- atomically (modifyTVar' readings (+ 1) >> readTVar readings)
                 False <$ when (k > 1) b
-          L.monitor l (L.polling l (tick stage) reading) hang a
-        (_, these) -> L.firstOf l these
+          Signal.monitor (Signal.polling (tick stage) reading) hang a
+        (_, these) -> Parallel.firstOf these
       stimuli = case cause of
         ByCaller -> [(0, Changes ()), (0, CancelsCaller)]
         ByFailure -> [(0, Changes ())]
@@ -222,8 +223,8 @@ relays size = do
 
 -- | The operator may run late, when several branches have ended. The branch that ended first
 -- decides (or failed first, if the operator waits for all), which is also the leftmost here.
-leftWins :: Stage -> Language -> Relay -> IO ()
-leftWins stage l (Relay composition n runners) = do
+leftWins :: Stage -> Relay -> IO ()
+leftWins stage (Relay composition n runners) = do
   threadIds <- traverse (const newEmptyTMVarIO) runners
   let before = pure () : map (\threadId' -> atomically (takeTMVar threadId') >>= untilOver stage) threadIds
       runner (k, how) wait threadId' =
@@ -231,11 +232,11 @@ leftWins stage l (Relay composition n runners) = do
       runs = zipWith3 runner runners before threadIds
       these = [fromMaybe hang (lookup k runs) | k <- [0 .. n - 1]]
       whole = case (composition, these) of
-        (AsAll, _) -> sum <$> L.allOf l these
-        (AsDecision, _) -> L.decide l firstEnd these
-        (AsPair, [a, b]) -> 1 <$ L.both l a b
-        (AsRace, [a, b]) -> firstNumber <$ L.parallel l a b
-        _ -> L.firstOf l these
+        (AsAll, _) -> sum <$> Parallel.allOf these
+        (AsDecision, _) -> Parallel.decide firstEnd these
+        (AsPair, [a, b]) -> 1 <$ both a b
+        (AsRace, [a, b]) -> firstNumber <$ parallel a b
+        _ -> Parallel.firstOf these
       firstNumber = maybe 0 fst (listToMaybe runners)
       failures = filter ((== Fails) . snd) runners
       expected = case composition of

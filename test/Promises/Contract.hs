@@ -23,11 +23,12 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isNothing)
 
-import Behavior (Behavior, BehaviorFailed, failWith)
+import Behavior (Behavior, BehaviorFailed, attempt, both, failWith, fallback, parallel)
 import Behavior.Internal.Runtime (Label (..), atomically, liveThreadCount)
+import qualified Behavior.Parallel as Parallel
 import Behavior.Signal (Signal, watching)
-import Promises.Language (Language)
-import qualified Promises.Language as L
+import qualified Behavior.Signal as Signal
+import Behavior.Time (timeout)
 import Promises.Stage hiding (ending)
 import Promises.Tree
 import Support (Ending (..), ThreadEvent (..), endingOf, hang, watchingThreads)
@@ -39,16 +40,15 @@ data Clause = Structure | Exclusion | Work | FaultOut | Masking | Outcomes | Lab
 -- | The state of a test while its program runs.
 data Context = Context
   { stage :: Stage
-  , language :: Language
   , input :: TVar Int
   , recordedViolations :: Log (Clause, String)
   , threadLabels :: IORef (Map ThreadId Label)
   }
 
 -- | Runs the program, and checks that no operator in it violated the clause.
-satisfies :: Clause -> Stage -> Language -> Program -> IO ()
-satisfies clause stage' language' (Program tree stimuli state) = do
-  context <- Context stage' language' <$> newTVarIO 0 <*> newLog <*> newIORef Map.empty
+satisfies :: Clause -> Stage -> Program -> IO ()
+satisfies clause stage' (Program tree stimuli state) = do
+  context <- Context stage' <$> newTVarIO 0 <*> newLog <*> newIORef Map.empty
   let caller = do
         before <- liveThreadCount
         end <- try (inState state (toBehavior context tree))
@@ -106,19 +106,19 @@ toBehavior t = \case
   Leaf act -> perform (stage t) (pure ()) (recordViolation t Structure "a cleanup was interrupted") act
   Fallback a b -> do
     state <- getMaskingState
-    L.fallback l (toBehavior t a) $ do
+    fallback (toBehavior t a) $ do
       inside <- getMaskingState
       unless (inside == state) $ recordViolation t Masking ("the second of ? runs " ++ show inside)
       toBehavior t b
-  Attempt n a -> L.attempt l n (toBehavior t a)
+  Attempt n a -> attempt n (toBehavior t a)
   Parallel a b -> observed t "parallel" Concurrent [] $ \branch ->
-    0 <$ L.parallel l (branch 1 "left" a) (branch 2 "right" b)
+    0 <$ parallel (branch 1 "left" a) (branch 2 "right" b)
   Both a b -> observed t "both" Concurrent [] $ \branch ->
-    0 <$ L.both l (branch 1 "left" a) (branch 2 "right" b)
+    0 <$ both (branch 1 "left" a) (branch 2 "right" b)
   FirstOf as -> observed t "firstOf" Concurrent [] $ \branch ->
-    L.firstOf l [branch n (show n) a | (n, a) <- zip [1 ..] as]
+    Parallel.firstOf [branch n (show n) a | (n, a) <- zip [1 ..] as]
   AllOf as -> observed t "allOf" Concurrent [] $ \branch -> do
-    results <- L.allOf l [abs <$> branch n (show n) a | (n, a) <- zip [1 ..] as]
+    results <- Parallel.allOf [abs <$> branch n (show n) a | (n, a) <- zip [1 ..] as]
     let expected = map valueOf as
     unless (and (zipWith agree expected results) && length results == length as) $
       recordViolation t Outcomes ("allOf gave " ++ show results)
@@ -131,22 +131,21 @@ toBehavior t = \case
           n <- readIORef live
           unless (n == 0) $
             recordViolation t Structure ("what decide has chosen runs, but " ++ show n ++ " branches have not ended")
-    L.decide l (atLeast m chosen) [counted (branch n (show n) a) | (n, a) <- zip [1 ..] as]
+    Parallel.decide (atLeast m chosen) [counted (branch n (show n) a) | (n, a) <- zip [1 ..] as]
   Beside as b -> observed t "scoped" Concurrent [] $ \branch ->
-    L.beside l [void (branch n "fork" a) | (n, a) <- zip [2 ..] as] (branch 1 "body" b)
+    beside [void (branch n "fork" a) | (n, a) <- zip [2 ..] as] (branch 1 "body" b)
   Select sensing a b -> observed t "rSelect" Reactive [] $ \branch ->
-    L.rSelect l (odd <$> inputBy sensing) (branch 0 "left" a) (branch 0 "right" b)
+    Signal.rSelect (odd <$> inputBy sensing) (branch 0 "left" a) (branch 0 "right" b)
   Monitor sensing a b -> observed t "monitor" Reactive [] $ \branch ->
-    L.monitor l ((== 2) <$> inputBy sensing) (branch 0 "recovery" a >> clear) (branch 0 "task" b)
+    Signal.monitor ((== 2) <$> inputBy sensing) (branch 0 "recovery" a >> clear) (branch 0 "task" b)
   WhileHolding sensing a -> observed t "whileHolding" Reactive ["the condition does not hold"] $ \branch ->
-    L.whileHolding l ((/= 3) <$> inputBy sensing) (branch 0 "branch" a)
+    Signal.whileHolding ((/= 3) <$> inputBy sensing) (branch 0 "branch" a)
   Timeout n a -> observed t "timeout" Reactive ["TimedOut"] $ \branch ->
-    L.timeout l (fromIntegral n * tick (stage t)) (branch 0 "branch" a)
+    timeout (fromIntegral n * tick (stage t)) (branch 0 "branch" a)
  where
-  l = language t
   inputBy :: Sensing -> Signal Int
   inputBy Watched = watching (readTVar (input t))
-  inputBy (Polled n) = L.polling l (fromIntegral n * tick (stage t)) (atomically (readTVar (input t)))
+  inputBy (Polled n) = Signal.polling (fromIntegral n * tick (stage t)) (atomically (readTVar (input t)))
   -- A recovery that did not remove its own cause would repeat for ever.
   clear = atomically (modifyTVar' (input t) (\w -> if w == 2 then 1 else w))
   valueOf = \case

@@ -48,45 +48,45 @@ promises =
 structure, neverBoth, noLostWork, noLostFault, unmasked, ownLevel, together :: Promise
 structure =
   Promise "Structured: what an operator started has ended before it does"
-    177509 (programsOf AnyRoot) (satisfies Structure)
+    (programsOf AnyRoot) (satisfies Structure)
 neverBoth =
   Promise "Never both: a branch starts after the one before has ended"
-    158272 (programsOf ReactiveRoot) (satisfies Exclusion)
+    (programsOf ReactiveRoot) (satisfies Exclusion)
 noLostWork =
   Promise "No lost work: the result of a completed branch is kept, and the branch does not run again"
-    152695 (programsOf ReactiveRoot) (satisfies Work)
+    (programsOf ReactiveRoot) (satisfies Work)
 noLostFault =
   Promise "No lost fault: the leftmost fault is thrown"
-    87191 (programsOf AnyRoot) (satisfies FaultOut)
+    (programsOf AnyRoot) (satisfies FaultOut)
 unmasked =
   Promise "Interruptible: branches run unmasked, and the second of ? in its caller's masking state"
-    238881 (programsOf AnyRoot) (satisfies Masking)
+    (programsOf AnyRoot) (satisfies Masking)
 ownLevel =
   Promise "Interruptible: a stop request stops only what it is meant for"
-    135673 levels stoppedAtItsOwnLevel
+    levels stoppedAtItsOwnLevel
 together =
   Promise "Together: all stop requests are made before the operator waits for a branch"
-    147822 groups stoppedTogether
+    groups stoppedTogether
 
 labelled, deadSensors, nothingSpins, causes, firstThenLeft, latchedRecovery, readAfresh :: Promise
 labelled =
   Promise "Labelled: every thread has its operator's and its branch's name"
-    116238 (programsOf AnyRoot) (satisfies Labels)
+    (programsOf AnyRoot) (satisfies Labels)
 deadSensors =
   Promise "A dead sensor is never false"
-    38795 sensorFailures notTakenForFalse
+    sensorFailures notTakenForFalse
 nothingSpins =
   Promise "Nothing spins: readings start at least a period apart"
-    94583 scripts aPeriodApart
+    scripts aPeriodApart
 causes =
   Promise "The order of outcomes: each outcome has a cause in the branches"
-    115431 (programsOf AnyRoot) (satisfies Outcomes)
+    (programsOf AnyRoot) (satisfies Outcomes)
 firstThenLeft =
   Promise "The order of outcomes: the first branch to finish decides, on a tie the left one"
-    281018 relays leftWins
+    relays leftWins
 latchedRecovery =
   Promise "A recovery runs to its end, even if the condition becomes false"
-    45312 missions latched
+    missions latched
 readAfresh =
   Promise "A condition is read again after a stop"
-    68530 toggles readAgain
+    toggles readAgain

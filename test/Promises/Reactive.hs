@@ -28,11 +28,9 @@ import Data.Foldable (for_)
 import Test.QuickCheck (Gen, choose, elements, frequency, vectorOf)
 
 import Behavior (Behavior, failWith)
-import Behavior.Internal.Runtime (atomically)
 import Behavior.Signal (watching)
-import Behavior.Time (now)
-import Promises.Language (Language)
-import qualified Promises.Language as L
+import qualified Behavior.Signal as Signal
+import Behavior.Time (atomically, now)
 import Promises.Stage
 import Support (Ending (..), Fault (..), hang)
 
@@ -69,8 +67,8 @@ sensorFailures size = do
 
 -- | The branch is stopped, no other branch starts, and the operator throws what the sensor
 -- threw, unless the branch ends otherwise than by stopping.
-notTakenForFalse :: Stage -> Language -> SensorFailure -> IO ()
-notTakenForFalse stage l (SensorFailure operator sensor cause fromTheStart act) = do
+notTakenForFalse :: Stage -> SensorFailure -> IO ()
+notTakenForFalse stage (SensorFailure operator sensor cause fromTheStart act) = do
   dead <- newTVarIO fromTheStart
   inside <- newTVarIO False
   others <- newLog
@@ -85,16 +83,16 @@ notTakenForFalse stage l (SensorFailure operator sensor cause fromTheStart act) 
             LosingValue -> retry
       signal = case sensor of
         WatchedSensor -> watching reading
-        PolledSensor n -> L.polling l (fromIntegral n * tick stage) (atomically reading)
+        PolledSensor n -> Signal.polling (fromIntegral n * tick stage) (atomically reading)
       branch =
         perform stage (atomically (writeTVar inside True)) (pure ()) act
           {takes = untilStopped, uninterruptible = False}
       other = 0 <$ append others ()
       operating = case operator of
-        Selecting True -> L.rSelect l signal branch other
-        Selecting False -> L.rSelect l signal other branch
-        Monitoring -> L.monitor l signal (append others ()) branch
-        Holding -> L.whileHolding l signal branch
+        Selecting True -> Signal.rSelect signal branch other
+        Selecting False -> Signal.rSelect signal other branch
+        Monitoring -> Signal.monitor signal (append others ()) branch
+        Holding -> Signal.whileHolding signal branch
       stimuli = [(0, Changes ()) | not fromTheStart]
   end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar dead True)) stimuli operating)
   started <- readLog others
@@ -130,8 +128,8 @@ scripts size =
     <*> (choose (0, if size == Tiny then 2 else 6) >>= \n -> vectorOf n (elements [False, True]))
 
 -- | Readings start at least a period apart, rereads and those after a recovery included.
-aPeriodApart :: Stage -> Language -> Script -> IO ()
-aPeriodApart stage l (Script operator every values) = do
+aPeriodApart :: Stage -> Script -> IO ()
+aPeriodApart stage (Script operator every values) = do
   started <- newTVarIO (0 :: Int)
   begun <- newLog
   let apart = fromIntegral every * tick stage
@@ -140,13 +138,13 @@ aPeriodApart stage l (Script operator every values) = do
         k <- atomically (modifyTVar' started (+ 1) >> readTVar started)
         pure (and (take 1 (drop (k - 1) values)) && k <= length values)
       branch = until' started (> length values + 1)
-      signal = L.polling l apart reading
+      signal = Signal.polling apart reading
   end <- run stage $ do
     t <- now
     (,) t <$> calling stage pure [] (case operator of
-      Monitoring -> L.monitor l signal (pure ()) branch
-      Selecting _ -> L.rSelect l signal branch branch
-      Holding -> L.whileHolding l (not <$> signal) branch)
+      Monitoring -> Signal.monitor signal (pure ()) branch
+      Selecting _ -> Signal.rSelect signal branch branch
+      Holding -> Signal.whileHolding (not <$> signal) branch)
   case end of
     Gave (t, ended) -> do
       moments <- readLog begun
@@ -199,8 +197,8 @@ data Milestone = TaskStarts | TaskStopRequested | RecoveryStarts | RecoveryEnds 
 -- the condition holds when it is read again. If the task completes despite the request, the
 -- recovery does not run. If the task fails or faults, the recovery runs, and then the failure
 -- or fault is thrown.
-latched :: Stage -> Language -> Mission -> IO ()
-latched stage l mission = do
+latched :: Stage -> Mission -> IO ()
+latched stage mission = do
   needed <- newTVarIO (atTheStart mission)
   inside <- newTVarIO False
   runs <- newTVarIO (0 :: Int)
@@ -233,7 +231,7 @@ latched stage l mission = do
         append milestones RecoveryEnds
         when isLast . void $ finish 9 (ofRecovery mission)
       stimuli = [(0, Changes ()) | not neededAtStart]
-      whole = L.monitor l (watching (readTVar needed)) recovering working
+      whole = Signal.monitor (watching (readTVar needed)) recovering working
   end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar needed True)) stimuli whole)
   reached <- readLog milestones
   let recovery = [RecoveryStarts, RecoveryEnds]
@@ -275,15 +273,15 @@ toggles size =
   change = (,) <$> choose (0, 2) <*> elements [False, True]
 
 -- | The next branch is chosen by the condition's value at the end of the branch before.
-readAgain :: Stage -> Language -> Toggles -> IO ()
-readAgain stage l (Toggles sensor first stops) = do
+readAgain :: Stage -> Toggles -> IO ()
+readAgain stage (Toggles sensor first stops) = do
   condition <- newTVarIO first
   starts <- newTVarIO (0 :: Int)
   left <- newTVarIO stops
   started <- newLog
   let signal = case sensor of
         WatchedSensor -> watching (readTVar condition)
-        PolledSensor n -> L.polling l (fromIntegral n * tick stage) (atomically (readTVar condition))
+        PolledSensor n -> Signal.polling (fromIntegral n * tick stage) (atomically (readTVar condition))
       branch name = do
         append started name
         again <- atomically (readTVar left)
@@ -296,7 +294,7 @@ readAgain stage l (Toggles sensor first stops) = do
               atomically (writeTVar condition new)
               throwIO (e :: SomeException)
       toggle k = until' starts (>= k) >> atomically (modifyTVar' condition not)
-      whole = L.rSelect l signal (branch True) (branch False)
+      whole = Signal.rSelect signal (branch True) (branch False)
   end <- run stage (calling stage toggle [(0, Changes k) | k <- [1 .. length stops]] whole)
   these <- readLog started
   let expected = first : map snd stops

@@ -27,6 +27,7 @@ module Promises.Stage
   , End (..)
   , StopResponse (..)
   , perform
+  , beside
   , finish
   , acts
   , ends
@@ -41,7 +42,7 @@ module Promises.Stage
 
 import Control.Concurrent (ThreadId)
 import Control.Exception
-import Data.Foldable (for_)
+import Data.Foldable (for_, traverse_)
 import Data.IORef
 import Test.QuickCheck (Gen, choose, elements, frequency)
 import Test.QuickCheck.Gen (unGen)
@@ -58,17 +59,15 @@ import Behavior.Internal.Runtime
   , start
   , threadEnd
   )
-import Promises.Language
+import Behavior.Parallel (fork, scoped)
 import Support (Cancel (..), Ending, Failure (..), Fault (..), endingOf)
 
 -- | A promise of the library: random programs, and a test whether one run of one of them
 -- kept the promise. It is independent of how the program is run.
 data Promise = forall program. Show program => Promise
   { promised :: String
-  , salt :: Int
-  -- ^ A number of its own, so that each promise is tried with other random programs.
   , programs :: Size -> Gen program
-  , kept :: Stage -> Language -> program -> IO ()
+  , kept :: Stage -> program -> IO ()
   -- ^ Runs the program once, and throws 'Broken' if the promise was not kept.
   }
 
@@ -190,6 +189,10 @@ perform stage begun cleanupInterrupted act = work `catch` stopping
           FailsToStop -> finish (number act) Fails
           FaultsInCleanup -> throwIO (Fault ("the cleanup of " ++ show (number act)))
     | otherwise = throwIO e
+
+-- | Forks the behaviours of the list in a scope, then runs the other as its body.
+beside :: [Behavior ()] -> Behavior a -> Behavior a
+beside others body = scoped (\nursery -> traverse_ (fork nursery) others >> body)
 
 finish :: Int -> End -> Behavior Int
 finish n Succeeds = pure n

@@ -7,19 +7,18 @@ module Promises.Trying
   , underRandom
   , underAll
   , inReality
-  , firstRejection
   ) where
 
 import Control.Concurrent (ThreadId, yield)
 import Control.Exception hiding (Deadlock)
 import Control.Monad (forM_, unless)
 import Data.IORef
+import Data.List (foldl')
 import GHC.Conc (ThreadStatus (..), threadStatus)
 
 import Behavior (Behavior)
 import Behavior.Internal.Runtime (interrupt)
 import Behavior.Sim
-import Promises.Language (Language)
 import Promises.Stage
 import Support (Cancel (..), endingOf, within)
 import qualified Support
@@ -45,17 +44,17 @@ instance Show Tried where
 
 -- | Tests the given number of random schedules in all, of random programs. The first argument
 -- is the number of the first program.
-underRandom :: Int -> Int -> Language -> Promise -> IO Tried
-underRandom from n language (Promise _ itsSalt gen keeping) =
+underRandom :: Int -> Int -> Promise -> IO Tried
+underRandom from n (Promise text gen keeping) =
   mconcat <$> mapM one (take (n `div` perProgram) [from ..])
  where
   one i =
-    let program = programFrom (gen Full) (seedOf itsSalt i)
-     in tried (show program) (Random perProgram (seedOf itsSalt i)) (\stage -> keeping stage language program)
+    let program = programFrom (gen Full) (seedOf text i)
+     in tried (show program) (Random perProgram (seedOf text i)) (\stage -> keeping stage program)
 
--- | The seed of a promise's i-th program, which depends on the promise.
-seedOf :: Int -> Int -> Int
-seedOf itsSalt i = i + 1000003 * itsSalt
+-- | The seed of the i-th program for the promise with this text: each promise is tried with other programs.
+seedOf :: String -> Int -> Int
+seedOf text i = i + 1000003 * foldl' (\n c -> (31 * n + fromEnum c) `mod` 1000003) 0 text
 
 -- | How many schedules are tried of each random program.
 perProgram :: Int
@@ -64,13 +63,13 @@ perProgram = 20
 -- | Tests all schedules of small programs. The arguments are the number of the first program,
 -- the greatest number of pre-emptions, the greatest number of schedules that a program may
 -- have, and how many programs are tested.
-underAll :: Int -> Int -> Int -> Int -> Language -> Promise -> IO Tried
-underAll from preemptions limit n language (Promise _ itsSalt gen keeping) =
+underAll :: Int -> Int -> Int -> Int -> Promise -> IO Tried
+underAll from preemptions limit n (Promise text gen keeping) =
   mconcat <$> mapM one (take n [from ..])
  where
   one i =
-    let program = programFrom (gen Tiny) (seedOf itsSalt i)
-     in tried (show program) (Exhaustive preemptions limit) (\stage -> keeping stage language program)
+    let program = programFrom (gen Tiny) (seedOf text i)
+     in tried (show program) (Exhaustive preemptions limit) (\stage -> keeping stage program)
 
 tried :: String -> Search -> (Stage -> IO ()) -> IO Tried
 tried program how keeping =
@@ -101,11 +100,11 @@ simulated simulating =
     }
 
 -- | Tests the given number of random programs in reality, from the one with this number on.
-inReality :: Int -> Int -> Language -> Promise -> IO ()
-inReality from n language (Promise _ itsSalt gen keeping) =
+inReality :: Int -> Int -> Promise -> IO ()
+inReality from n (Promise text gen keeping) =
   forM_ (take n [from ..]) $ \i -> do
-    let program = programFrom (gen Full) (seedOf itsSalt i)
-    within 20 (keeping real language program) `catch` \(Broken how) ->
+    let program = programFrom (gen Full) (seedOf text i)
+    within 20 (keeping real program) `catch` \(Broken how) ->
       broken ("of this program:\n" ++ show program ++ "\n" ++ how)
 
 real :: Stage
@@ -120,19 +119,3 @@ real =
   over thread = do
     status <- threadStatus thread
     unless (status `elem` [ThreadFinished, ThreadDied]) (yield >> over thread)
-
--- | The number of the first random schedule under which the promise is broken, if it is within
--- the limit. The programs and the schedules depend on the seed.
-firstRejection :: Int -> Int -> Language -> Promise -> IO (Maybe Int)
-firstRejection limit seed language (Promise _ _ gen keeping) = go 1
- where
-  go i
-    | i > limit = pure Nothing
-    | otherwise = do
-        let program = programFrom (gen Full) (seed * 1000003 + i)
-        rejected <- newIORef False
-        _ <- tryExplore (randomly 1) {planSearch = Random 1 (seed * 1000003 + i), planOptions = limits} $ \simulating ->
-          keeping (simulated simulating) language program
-            `catch` \(Broken _) -> writeIORef rejected True
-        yes <- readIORef rejected
-        if yes then pure (Just i) else go (i + 1)
