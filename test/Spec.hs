@@ -59,6 +59,7 @@ import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
 import qualified Reality.RealitySpec
+import qualified Sim.ClaimSpec
 import qualified Sim.DeliverySpec
 import qualified Sim.EndSpec
 import qualified Sim.ExploreSpec
@@ -125,6 +126,7 @@ main = hspec $ do
     Sim.SlipSpec.spec
     Sim.ExploreSpec.spec
     Sim.RecordSpec.spec
+    Sim.ClaimSpec.spec
     Sim.MockSpec.spec
     Sim.VacuousSpec.spec
     Sim.QuickCheckSpec.spec

@@ -36,7 +36,7 @@ spec = guarded $ do
     for_ [0.5, 1, 4, 4.25, 8.5, 10, 10.5, 11.5] $ \moment ->
       survives 50 (day calm {cancelledAt = moment} "returned" drone mempty)
   it "and a drone for which landing is an emergency does not" $
-    failsWith "exactly 1 times \"land\" begins" 50 (day calm {windAt = 11.5} "returned" landingInFlight mempty)
+    failsWith "exactly once \"land\" begins" 50 (day calm {windAt = 11.5} "returned" landingInFlight mempty)
   it "and a drone whose landing can be stopped does not" $
     failsWith "\"land\" is done" 50 (day calm {cancelledAt = 11.5} "returned" stoppable mempty)
   it "and a drone that lands only after a flight without faults does not" $

@@ -31,7 +31,7 @@ spec = guarded $ do
     for_ moments $ \moment ->
       survives 30 (day [3, 7] moment mempty pickAndPlace)
   it "and an arm whose parking can be stopped does not" $
-    failsWith "exactly 1 times \"park\" is done" 50 . day [3, 7] 7.75 mempty $ \arm ->
+    failsWith "exactly once \"park\" is done" 50 . day [3, 7] 7.75 mempty $ \arm ->
       pickAndPlace arm {park = pure ()} `finally` park arm
   it "and an arm that reacts to a slip in another branch, before it has stopped, does not" $
     failsWith "never \"gripper\" is running while \"move to\" is running" 50 (day [1] 60 mempty reactingBeside)

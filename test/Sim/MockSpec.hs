@@ -432,6 +432,7 @@ refusals = do
   it "is a claim about an unknown name" $ do
     mock <- newMock
     _ <- action mock "act" [succeeds]
+    begin mock
     (mock `shouldRecord` never (startOf "atc"))
       `shouldThrow` \(BrokenClaim why) -> "called \"atc\", only \"act\"" `isInfixOf` why
  where

@@ -27,10 +27,7 @@ attack =
     , ("with it, masked", operating mask_)
     ]
   operating :: (IO () -> IO ()) -> IO () -> IO ()
-  operating around cleanup =
-    void (try (around act) :: IO (Either SomeException ()))
-   where
-    act = parallel (milliseconds 3600000 `finally` cleanup) (milliseconds 20)
+  operating around cleanup = void (try (around (parallel (milliseconds 3600000 `finally` cleanup) (milliseconds 20))) :: IO (Either SomeException ()))
   again act = act `catch` \BlockedIndefinitelyOnMVar -> again act
   awaiting n woken collecting name = do
     done <- tryTakeMVar woken

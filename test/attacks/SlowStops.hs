@@ -22,11 +22,10 @@ attack = do
     box <- newEmptyMVar
     _ <- forkIO (uninterruptibleMask_ (readMVar gate) `finally` putMVar box ())
     uninterruptibleMask_ (takeMVar box))
-  let waits gate = mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ()))
-  beside <- sideBySide "20,000 side by side" waits
+  beside <- sideBySide "20,000 side by side" (\gate -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())))
   one <- waiting "one alone" $ \gate -> do
     done <- newEmptyMVar
-    _ <- forkIO (waits gate `finally` putMVar done ())
+    _ <- forkIO (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())) `finally` putMVar done ())
     pure (takeMVar done)
   nested <- waiting "1,500 one inside the other" $ \gate -> do
     let nest :: Int -> IO ()

@@ -64,6 +64,7 @@ module Behavior.Sim.Mock
   , Record (..)
   , RecordEntry (..)
   , EntryKind (..)
+  , SubjectKind (..)
 
     -- * Claims
   , Claim
@@ -108,4 +109,5 @@ import Behavior.Internal.Mock.Driver
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Script
+import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Mock.World

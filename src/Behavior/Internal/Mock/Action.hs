@@ -22,6 +22,7 @@ import Data.Maybe (fromMaybe)
 import Behavior.Internal.Failure (Behavior, Failed (..), isCancellation, isFailure)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Script
+import Behavior.Internal.Mock.Subject (SubjectKind (..))
 import Behavior.Internal.Mock.World
 import Behavior.Internal.Runtime
 import Behavior.Internal.SafeText
@@ -56,7 +57,7 @@ import Behavior.Internal.Trace.Span (actionSpan)
 action :: Mock -> String -> [Script a] -> IO (Behavior a)
 action mock name scripts = do
   checkScripts ("action " ++ show name) scripts
-  registerAction mock name
+  register mock AnAction name
   calls <- newIORef Map.empty
   pure (actionSpan name (play mock (nextCall mock calls name "" scripts)))
 
@@ -72,7 +73,7 @@ action mock name scripts = do
 -- @since 0.1.0.0
 actionOn :: Show x => Mock -> String -> (x -> [Script a]) -> IO (x -> Behavior a)
 actionOn mock name scripts = do
-  registerAction mock name
+  register mock AnActionOn name
   calls <- newIORef Map.empty
   pure $ \x -> do
     -- The scripts of an argument can be checked only when the argument is known.
@@ -93,7 +94,7 @@ actionOn mock name scripts = do
 sensor :: Show a => Mock -> String -> [Script a] -> IO (Behavior a)
 sensor mock name scripts = do
   checkScripts ("sensor " ++ show name) scripts
-  registerName mock "sensor" name
+  register mock ASensor name
   calls <- newIORef Map.empty
   newest <- newIORef Nothing
   let write t kind = recordEntry mock (RecordEntry t name "" 1 kind)

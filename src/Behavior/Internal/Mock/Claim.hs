@@ -21,20 +21,25 @@ module Behavior.Internal.Mock.Claim
 
 import Control.Applicative ((<|>))
 import Data.Char (toUpper)
-import Data.List (intercalate, isPrefixOf)
+import Data.Foldable (for_)
+import Data.List (intercalate, sortOn)
 import Data.Maybe (listToMaybe)
 
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
+import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime (Seconds)
 
 -- $setup
+-- >>> import Data.List (sortOn)
 -- >>> import Behavior.Sim.Mock
 -- >>> import Behavior.Internal.Mock.Record
 -- >>> let line s name = RecordEntry s name "" 1
--- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" StopRequested, line 5 "drive" Stops]
+-- >>> let low = [line 0 "low" (Is "False"), line 4 "low" (Becomes "True")]
+-- >>> let drive = [line 0 "drive" Begins, line 4 "drive" StopRequested, line 5 "drive" Stops]
 -- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
--- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
+-- >>> let entries = sortOn entryTime (low ++ drive ++ charge)
+-- >>> let record = Record [("low", ACondition), ("drive", AnAction), ("charge", AnAction)] entries 9
 -- >>> let check claim = either putStr pure (verdict claim record)
 
 -- | A claim about a record. Two claims joined by '<>' hold when both hold; if not, the report has the
@@ -48,8 +53,8 @@ import Behavior.Internal.Runtime (Seconds)
 -- @since 0.1.0.0
 data Claim = Claim
   { claimWords :: String
-  , claimNames :: [String]
-  , violation :: Lines -> Origin -> Maybe Violation
+  , claimNeeds :: [Need]
+  , violation :: Record -> Origin -> Maybe Violation
   -- ^ How it does not hold for the entries after the origin, if so.
   }
 
@@ -58,8 +63,8 @@ data Violation = Violation
   { broken :: String
   -- ^ The claim; of several that are joined, the one that does not hold.
   , reason :: String
-  , shown :: Lines
-  -- ^ The entries that show it.
+  , shown :: [Line]
+  -- ^ The lines that show it.
   }
 
 -- | The entry after which a claim is checked, and its time. (For the whole record the
@@ -68,8 +73,8 @@ data Origin = Origin Int Seconds
 
 instance Semigroup Claim where
   a <> b =
-    Claim (intercalate ", and " (filter (not . null) [claimWords a, claimWords b])) (claimNames a ++ claimNames b) $
-      \rows origin -> violation a rows origin <|> violation b rows origin
+    Claim (intercalate ", and " (filter (not . null) [claimWords a, claimWords b])) (claimNeeds a ++ claimNeeds b) $
+      \record origin -> violation a record origin <|> violation b record origin
 
 instance Monoid Claim where
   mempty = Claim "" [] (\_ _ -> Nothing)
@@ -83,6 +88,9 @@ eventually = withinSeconds (1 / 0)
 -- | It happens within the given number of seconds (to a microsecond): from the beginning,
 -- or under 'whenever' from that moment on. A negative number or NaN is rejected with an
 -- 'Control.Exception.ErrorCall'.
+--
+-- A run that ends before the limit is no excuse: what has not come when it ends never came. (A claim
+-- that held because the run was cut would show nothing.) So let the run last longer than the limit.
 --
 -- >>> check (whenever (becoming "low" True) (withinSeconds 0.5 (startOf "charge")))
 -- This does not hold: whenever "low" becomes True, within 0.5 s "charge" begins.
@@ -98,10 +106,13 @@ eventually = withinSeconds (1 / 0)
 -- @since 0.1.0.0
 withinSeconds :: Seconds -> Moment -> Claim
 withinSeconds limit m
-  | limit >= 0 = claimOf (term ++ momentWords m) m $ \(Origin _ since) found -> case found of
-      [] -> Just ("it never came", [])
+  | limit >= 0 = claimOf (term ++ momentWords m) m $ \record (Origin _ since) found -> case found of
+      []
+        | limit < 1 / 0 && since + limit - tolerance > recordEnd record ->
+            Just ("it never came (the record ends at " ++ inSeconds (recordEnd record) ++ ", before the limit)", [])
+        | otherwise -> Just ("it never came", [])
       row : _
-        | time row - since <= limit + 0.000001 -> Nothing
+        | time row <= since + limit + tolerance -> Nothing
         | otherwise -> Just ("it came only at " ++ inSeconds (time row), [row])
   | otherwise = errorWithoutStackTrace ("withinSeconds: a limit is zero or more seconds, not " ++ show limit)
  where
@@ -113,7 +124,7 @@ withinSeconds limit m
 --
 -- @since 0.1.0.0
 never :: Moment -> Claim
-never m = claimOf ("never " ++ momentWords m) m $ \_ found -> case found of
+never m = claimOf ("never " ++ momentWords m) m $ \_ _ found -> case found of
   [] -> Nothing
   row : _ -> Just ("it was so at " ++ inSeconds (time row), [row])
 
@@ -121,21 +132,34 @@ never m = claimOf ("never " ++ momentWords m) m $ \_ found -> case found of
 --
 -- @since 0.1.0.0
 exactly :: Int -> Moment -> Claim
-exactly times m = claimOf ("exactly " ++ show times ++ " times " ++ momentWords m) m $ \_ found ->
-  if length found == times then Nothing else Just ("it was so " ++ show (length found) ++ " times", found)
+exactly n m = claimOf ("exactly " ++ times n ++ " " ++ momentWords m) m $ \_ _ found ->
+  if length found == n then Nothing else Just ("it was so " ++ times (length found), found)
+ where
+  times 1 = "once"
+  times many = show many ++ " times"
 
--- | The interval is going on at every entry (the initial values of conditions excepted).
+-- | The interval is going on all the time, up to the end of the record: at every entry (the initial values
+-- of conditions excepted), and at every moment after it.
 --
 -- >>> holds (whenever (startOf "charge") (always (being "low" True))) record
 -- True
 --
 -- @since 0.1.0.0
 always :: Interval -> Claim
-always s = simple ("always " ++ intervalWords s) (intervalNames s) $ \rows (Origin origin _) ->
-  let isInside n = any (\range -> from range <= at n && at n < to range) (intervalRanges s rows)
-   in case [row | row@(n, entry) <- rows, n > origin, not (isInitial entry || isInside n)] of
+always s = simple ("always " ++ intervalWords s) (intervalNeeds s) $ \record (Origin origin since) ->
+  let ranges = intervalRanges s record
+      rows = numbered record
+      end = Place (recordEnd record) After 0
+      -- It is going on all the time if it is at the entries, where one of its ranges ends, and at the end.
+      places =
+        [(at row, "at", time row) | row@(n, entry) <- rows, n > origin, not (isInitial entry)]
+          ++ [(p, "after", t - tolerance) | p@(Place t _ _) <- map to ranges, p > Place since At origin, p < end]
+          ++ [(end, "at", recordEnd record)]
+      isIncluded (place, _, _) = any (\range -> from range <= place && place < to range) ranges
+   in case sortOn (\(place, _, _) -> place) (filter (not . isIncluded) places) of
         [] -> Nothing
-        row : _ -> Just ("it was not so at " ++ inSeconds (time row), [row])
+        (place, word, t) : _ ->
+          Just ("it was not so " ++ word ++ " " ++ inSeconds t, take 1 (reverse (takeWhile ((<= place) . at) rows)))
  where
   -- The entries that the set-up of the world makes: not everything exists yet.
   isInitial entry = case entryKind entry of
@@ -158,8 +182,8 @@ always s = simple ("always " ++ intervalWords s) (intervalNames s) $ \rows (Orig
 -- @since 0.1.0.0
 comesBefore :: Moment -> Moment -> Claim
 comesBefore a b =
-  simple (momentWords a ++ " before " ++ momentWords b) (momentNames a ++ momentNames b) $ \rows (Origin origin _) ->
-    let after m = filter ((> origin) . fst) (occurrences m rows)
+  simple (momentWords a ++ " before " ++ momentWords b) (momentNeeds a ++ momentNeeds b) $ \record (Origin origin _) ->
+    let after m = filter ((> origin) . fst) (occurrences m record)
      in case (after a, after b) of
           (_, []) -> Nothing
           ((n, _) : _, (k, _) : _) | n < k -> Nothing
@@ -176,27 +200,25 @@ infix 7 `comesBefore`
 -- @since 0.1.0.0
 whenever :: Moment -> Claim -> Claim
 whenever m claim =
-  Claim (words' (claimWords claim)) (momentNames m ++ claimNames claim) $ \rows (Origin origin _) ->
+  Claim (words' (claimWords claim)) (momentNeeds m ++ claimNeeds claim) $ \record (Origin origin _) ->
     listToMaybe
       [ Violation (words' (broken v)) ("from " ++ inSeconds (time row) ++ " on, " ++ reason v) (row : shown v)
-      | row@(n, _) <- occurrences m rows
+      | row@(n, _) <- occurrences m record
       , n > origin
-      , Just v <- [violation claim rows (Origin n (time row))]
+      , Just v <- [violation claim record (Origin n (time row))]
       ]
  where
   words' then' = "whenever " ++ momentWords m ++ ", " ++ then'
 
--- | A claim that is not made of others: its words, its names, and why it does not hold, with the
--- entries that show it.
-simple :: String -> [String] -> (Lines -> Origin -> Maybe (String, Lines)) -> Claim
-simple words' names check = Claim words' names (\rows origin -> uncurry (Violation words') <$> check rows origin)
+-- | A claim that is not made of others: its words, what it needs, and why it does not hold, with the
+-- lines that show it.
+simple :: String -> [Need] -> (Record -> Origin -> Maybe (String, [Line])) -> Claim
+simple words' needs check = Claim words' needs (\record origin -> uncurry (Violation words') <$> check record origin)
 
-claimOf :: String -> Moment -> (Origin -> Lines -> Maybe (String, Lines)) -> Claim
-claimOf words' m check = simple words' (momentNames m) $ \rows origin@(Origin after _) ->
-  check origin (filter ((> after) . fst) (occurrences m rows))
-
-time :: (Int, RecordEntry) -> Seconds
-time = entryTime . snd
+-- | A claim about when a moment occurs.
+claimOf :: String -> Moment -> (Record -> Origin -> [Line] -> Maybe (String, [Line])) -> Claim
+claimOf words' m check = simple words' (momentNeeds m) $ \record origin@(Origin after _) ->
+  check record origin (filter ((> after) . fst) (occurrences m record))
 
 -- | Whether a claim holds. With hspec: @record \`shouldSatisfy\` holds claim@.
 -- ('Behavior.Sim.Mock.shouldRecord' also gives the reason if it does not.)
@@ -207,24 +229,26 @@ holds claim = either (const False) (const True) . verdict claim
 
 -- | Why a claim does not hold, with the lines of the record that show it.
 --
--- A claim about an unknown name does not hold; otherwise a typo would make 'never' true.
+-- A claim about a name that is unknown, or of something that never does this, does not hold; otherwise
+-- a mistake would make 'never' true.
 --
 -- >>> check (never (startOf "chrage"))
 -- This does not hold: never "chrage" begins.
 -- Nothing in this world is called "chrage", only "low", "drive", "charge".
+-- >>> check (never (startOf "low"))
+-- This does not hold: never "low" begins.
+-- "low" is a condition, and never begins. The actions of this world: "drive", "charge".
+--
+-- (The argument of an action may be any: one that is misspelt is not noticed.)
 --
 -- @since 0.1.0.0
 verdict :: Claim -> Record -> Either String ()
-verdict claim record = case (unknown, violation claim (numbered record) (Origin (-1) 0)) of
-  (name : _, _) ->
-    refuted (claimWords claim) ("Nothing in this world is called " ++ show name ++ ", only " ++ commas (map show (recordSubjects record)) ++ ".") []
-  ([], Just v) ->
-    refuted (broken v) (capital (reason v) ++ if null (recordEntries record) then "." else ":") (excerpt (map fst (shown v)) (recordEntries record))
-  ([], Nothing) -> Right ()
+verdict claim record = case unfit (recordSubjects record) (claimNeeds claim) of
+  Just why -> refuted (claimWords claim) why []
+  Nothing -> for_ (violation claim record (Origin (-1) 0)) $ \v ->
+    refuted (broken v) (capital (reason v) ++ if null entries then "." else ":") (excerpt (map fst (shown v)) entries)
  where
-  unknown = [name | name <- claimNames claim, not (any (`names` name) (recordSubjects record))]
-  names known name = known == name || (known ++ " ") `isPrefixOf` name
-  commas = intercalate ", "
+  entries = recordEntries record
   refuted which why rows = Left (unlines (("This does not hold: " ++ which ++ ".") : why : rows))
   capital why = map toUpper (take 1 why) ++ drop 1 why
 

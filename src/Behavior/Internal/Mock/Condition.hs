@@ -23,6 +23,7 @@ import Data.Maybe (isJust, listToMaybe)
 
 import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Mock.Record
+import Behavior.Internal.Mock.Subject (SubjectKind (ACondition))
 import Behavior.Internal.Mock.World
 import Behavior.Internal.Runtime
 import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..), Worker (..), constantView, fromView, namedWith)
@@ -82,7 +83,7 @@ condition mock name = partialCondition mock name . map (fmap Just)
 partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
 partialCondition mock name changes = do
   checkTimes (<) ("condition " ++ show name ++ ": the times of the changes start from zero and increase") (map fst changes)
-  registerName mock "condition" name
+  register mock ACondition name
   first <- newTVarIO (initial >>= snd)
   rest <- newTVarIO (if isJust initial then drop 1 changes else changes)
   let c = Condition mock name show first rest kinds

@@ -9,6 +9,7 @@ module Behavior.Internal.Mock.Driver (driver) where
 import Control.Exception (Exception (..), mask_, throwIO, uninterruptibleMask_)
 import Data.Foldable (for_)
 
+import Behavior.Internal.Mock.Subject (SubjectKind (ADriver))
 import Behavior.Internal.Mock.World
 import Behavior.Internal.Runtime
 
@@ -41,7 +42,7 @@ import Behavior.Internal.Runtime
 driver :: Show e => Mock -> String -> [(Seconds, e)] -> IO ((e -> IO ()) -> IO (IO ()))
 driver mock name messages = do
   checkTimes (<=) ("driver " ++ show name ++ ": the times of the messages start from zero and do not decrease") (map fst messages)
-  registerName mock "driver" name
+  register mock ADriver name
   pure $ \deliver -> do
     (zero, t) <- clock mock
     let due = dropWhile ((< t - zero) . fst) messages

@@ -5,8 +5,9 @@
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Moment
-  ( Lines
+  ( Line
   , numbered
+  , time
 
     -- * Moments
   , Moment (..)
@@ -31,26 +32,39 @@ module Behavior.Internal.Mock.Moment
   , heldFor
   , shortlyAfter
   , Range (..)
+
+    -- * Places
+  , Place (..)
+  , Side (..)
   , at
+  , tolerance
   ) where
 
 import Data.List (intercalate)
-import Data.Maybe (fromMaybe, listToMaybe, mapMaybe)
+import Data.Maybe (listToMaybe, mapMaybe)
 
 import Behavior.Internal.Mock.Record
+import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime (Seconds)
 
 -- $setup
+-- >>> import Data.List (sortOn)
 -- >>> import Behavior.Sim.Mock
 -- >>> import Behavior.Internal.Mock.Record
 -- >>> let line s name = RecordEntry s name "" 1
--- >>> let drive = [line 0 "drive" Begins, line 4 "low" (Becomes "True"), line 4 "drive" StopRequested, line 5 "drive" Stops]
+-- >>> let low = [line 0 "low" (Is "False"), line 4 "low" (Becomes "True")]
+-- >>> let drive = [line 0 "drive" Begins, line 4 "drive" StopRequested, line 5 "drive" Stops]
 -- >>> let charge = [line 5 "charge" Begins, line 9 "charge" Succeeds]
--- >>> let record = Record ["low", "drive", "charge"] (line 0 "low" (Is "False") : drive ++ charge)
+-- >>> let entries = sortOn entryTime (low ++ drive ++ charge)
+-- >>> let record = Record [("low", ACondition), ("drive", AnAction), ("charge", AnAction)] entries 9
 -- >>> let check claim = either putStr pure (verdict claim record)
 
--- | The entries of a record, numbered from 0.
-type Lines = [(Int, RecordEntry)]
+-- | An entry of a record, with its number from 0. (Where something is shown that has no entry of its
+-- own, the last entry before it, with another time.)
+type Line = (Int, RecordEntry)
+
+time :: Line -> Seconds
+time = entryTime . snd
 
 -- | A kind of record entry, of which there may be none, one or many:
 -- @startOf "recharge"@.
@@ -58,8 +72,9 @@ type Lines = [(Int, RecordEntry)]
 -- @since 0.1.0.0
 data Moment = Moment
   { momentWords :: String
-  , momentNames :: [String]
-  , occurrences :: Lines -> Lines
+  , momentNeeds :: [Need]
+  , occurrences :: Record -> [Line]
+  -- ^ In order.
   }
 
 -- | The action begins. For an action with an argument the name alone means any argument,
@@ -67,25 +82,25 @@ data Moment = Moment
 --
 -- @since 0.1.0.0
 startOf :: String -> Moment
-startOf = momentOf "begins" (== Begins)
+startOf = momentOf anyAction "begins" (== Begins)
 
 -- | The action ends, in any way, cleanup included.
 --
 -- @since 0.1.0.0
 endOf :: String -> Moment
-endOf = momentOf "ends" isEnd
+endOf = momentOf anyAction "ends" isEnd
 
 -- | The action returns its result.
 --
 -- @since 0.1.0.0
 successOf :: String -> Moment
-successOf = momentOf "is done" (== Succeeds)
+successOf = momentOf anyAction "is done" (== Succeeds)
 
 -- | The action (or its cleanup) fails, or the sensor does.
 --
 -- @since 0.1.0.0
 failureOf :: String -> Moment
-failureOf = momentOf "fails" isFailing
+failureOf = momentOf (anyAction ++ [ASensor]) "fails" isFailing
  where
   isFailing (Fails _) = True
   isFailing _ = False
@@ -94,7 +109,7 @@ failureOf = momentOf "fails" isFailing
 --
 -- @since 0.1.0.0
 faultOf :: String -> Moment
-faultOf = momentOf "faults" isFaulting
+faultOf = momentOf (anyAction ++ [ASensor]) "faults" isFaulting
 
 isFaulting :: EntryKind -> Bool
 isFaulting (Faults _) = True
@@ -104,27 +119,30 @@ isFaulting _ = False
 --
 -- @since 0.1.0.0
 interruptionOf :: String -> Moment
-interruptionOf = momentOf "is interrupted" (== StopRequested)
+interruptionOf = momentOf anyAction "is interrupted" (== StopRequested)
 
 -- | The condition, or the value that the sensor reads, becomes this, or is this from the
--- start.
+-- start. The record has values as they are shown: so a value of another type is one that never comes.
 --
 -- @since 0.1.0.0
 becoming :: Show a => String -> a -> Moment
-becoming name value = momentOf ("becomes " ++ show value) (`elem` [Is (show value), Becomes (show value)]) name
+becoming name value = momentOf [ASensor, ACondition] ("becomes " ++ show value) (`elem` kinds) name
+ where
+  kinds = [Is (show value), Becomes (show value)]
 
--- | This text was recorded by 'Behavior.Sim.Mock.note'.
+-- | This text was recorded by 'Behavior.Sim.Mock.note', or by a 'Behavior.Sim.Mock.driver'. It may be any
+-- text: one that nothing notes never comes.
 --
 -- @since 0.1.0.0
 noted :: String -> Moment
-noted text = (momentOf "is noted" (== Noted) text) {momentNames = []}
+noted text = (momentOf [] "is noted" (== Noted) text) {momentNeeds = []}
 
-momentOf :: String -> (EntryKind -> Bool) -> String -> Moment
-momentOf verb isIt name =
+momentOf :: [SubjectKind] -> String -> (EntryKind -> Bool) -> String -> Moment
+momentOf kinds verb isIt name =
   Moment
     { momentWords = show name ++ " " ++ verb
-    , momentNames = [name]
-    , occurrences = filter $ \(_, entry) -> entry `isAbout` name && isIt (entryKind entry)
+    , momentNeeds = [Need name verb kinds]
+    , occurrences = filter (\(_, entry) -> entry `isAbout` name && isIt (entryKind entry)) . numbered
     }
 
 isAbout :: RecordEntry -> String -> Bool
@@ -148,12 +166,12 @@ anyOf :: [Moment] -> Moment
 anyOf ms =
   Moment
     { momentWords = intercalate " or " (map momentWords ms)
-    , momentNames = concatMap momentNames ms
-    , occurrences = \rows -> foldr (merged . (`occurrences` rows)) [] ms
+    , momentNeeds = concatMap momentNeeds ms
+    , occurrences = \record -> foldr (merged . (`occurrences` record)) [] ms
     }
 
--- | The rows of both lists, each once, in order.
-merged :: Lines -> Lines -> Lines
+-- | The lines of both lists, each once, in order.
+merged :: [Line] -> [Line] -> [Line]
 merged (x : xs) (y : ys) = case compare (fst x) (fst y) of
   LT -> x : merged xs (y : ys)
   EQ -> x : merged xs ys
@@ -190,10 +208,10 @@ restricted :: String -> (Bool -> Bool) -> Moment -> Interval -> Moment
 restricted word wanted m s =
   Moment
     { momentWords = momentWords m ++ " " ++ word ++ " " ++ intervalWords s
-    , momentNames = momentNames m ++ intervalNames s
-    , occurrences = \rows ->
-        let inside (n, _) = any (isInside (at n)) (intervalRanges s rows)
-         in filter (wanted . inside) (occurrences m rows)
+    , momentNeeds = momentNeeds m ++ intervalNeeds s
+    , occurrences = \record ->
+        let ranges = intervalRanges s record
+         in filter (\row -> wanted (any (isInside (at row)) ranges)) (occurrences m record)
     }
 
 -- | One interval starts while the other is going on. To claim that two actions exclude
@@ -206,25 +224,30 @@ restricted word wanted m s =
 -- @since 0.1.0.0
 overlapping :: Interval -> Interval -> Moment
 overlapping a b =
-  Moment (intervalWords a ++ " while " ++ intervalWords b) (intervalNames a ++ intervalNames b) $ \rows ->
-    let as = intervalRanges a rows
-        bs = intervalRanges b rows
+  Moment (intervalWords a ++ " while " ++ intervalWords b) (intervalNeeds a ++ intervalNeeds b) $ \record ->
+    let as = intervalRanges a record
+        bs = intervalRanges b record
         these `startsIn` others = [start this | this <- these, any (isInside (from this)) others]
      in merged (as `startsIn` bs) (bs `startsIn` as)
 
 infixl 8 `during`, `outside`, `overlapping`
 
--- | How often it happened.
+-- | How often it happened. A name that does not fit the world is rejected with an
+-- 'Control.Exception.ErrorCall' (a claim with such a name does not hold).
 --
 -- >>> countOf (startOf "drive") record
 -- 1
+-- >>> countOf (startOf "low") record
+-- *** Exception: "low" is a condition, and never begins. The actions of this world: "drive", "charge".
 --
 -- @since 0.1.0.0
 countOf :: Moment -> Record -> Int
-countOf m = length . occurrences m . numbered
+countOf m record = case unfit (recordSubjects record) (momentNeeds m) of
+  Just why -> errorWithoutStackTrace why
+  Nothing -> length (occurrences m record)
 
 -- | The lines of a record.
-numbered :: Record -> Lines
+numbered :: Record -> [Line]
 numbered = zip [0 ..] . recordEntries
 
 -- | Something that has a start and an end: an action that runs, or a condition that has
@@ -233,26 +256,31 @@ numbered = zip [0 ..] . recordEntries
 -- @since 0.1.0.0
 data Interval = Interval
   { intervalWords :: String
-  , intervalNames :: [String]
-  , intervalRanges :: Lines -> [Range]
-  -- ^ Each time that it is going on, in order.
+  , intervalNeeds :: [Need]
+  , intervalRanges :: Record -> [Range]
+  -- ^ Each time that it is going on, in order. None starts after the end of the record.
   }
 
 -- | One time that an interval is going on.
 data Range = Range
   { from :: Place
   , to :: Place
-  , start :: (Int, RecordEntry)
-  -- ^ The entry that shows its start, at the time of the start.
+  , start :: Line
+  -- ^ The line that shows its start, at the time of the start.
   }
 
--- | A place in a record: at the entry with this number, or between it and the next one (if the second
--- number is not 0).
-type Place = (Int, Int)
+-- | A place in a record: the time; whether it is before or after all that happens at that time, or at
+-- the entry with the given number.
+data Place = Place Seconds Side Int
+  deriving (Eq, Ord)
 
--- | The place of the entry with this number.
-at :: Int -> Place
-at n = (n, 0)
+-- | In order.
+data Side = Before | At | After
+  deriving (Eq, Ord)
+
+-- | The place of a line.
+at :: Line -> Place
+at (n, entry) = Place (entryTime entry) At n
 
 -- | Whether a place is between the start and the end.
 isInside :: Place -> Range -> Bool
@@ -263,7 +291,7 @@ isInside place range = from range < place && place < to range
 -- @since 0.1.0.0
 running :: String -> Interval
 running name =
-  Interval (show name ++ " is running") [name] $
+  Interval (show name ++ " is running") [Need name "is running" anyAction] $
     rangesFrom (\e -> e `isAbout` name && entryKind e == Begins) $ \begun e ->
       fullName e == fullName begun && entryCall e == entryCall begun && isEnd (entryKind e)
 
@@ -272,19 +300,22 @@ running name =
 -- @since 0.1.0.0
 being :: Show a => String -> a -> Interval
 being name value =
-  Interval (show name ++ " is " ++ show value) [name] $
+  Interval (show name ++ " is " ++ show value) [Need name ("is " ++ show value) [ASensor, ACondition]] $
     rangesFrom (\e -> e `isAbout` name && entryKind e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
       e `isAbout` name && changes (entryKind e)
  where
   changes (Becomes _) = True
   changes kind = kind == LosesValue
 
-rangesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Lines -> [Range]
-rangesFrom begins ends rows =
-  [ Range (at n) (at (fromMaybe maxBound (listToMaybe [k | (k, e) <- drop (n + 1) rows, ends entry e]))) row
+rangesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Record -> [Range]
+rangesFrom begins ends record =
+  [ Range (at row) (maybe openEnd at (listToMaybe (filter (ends entry . snd) (drop (n + 1) rows)))) row
   | row@(n, entry) <- rows
   , begins entry
   ]
+ where
+  rows = numbered record
+  openEnd = Place (1 / 0) After 0
 
 -- | Only after it has been going on for the given number of seconds: so what happens at the moment of its
 -- start, or shortly after it, does not count. A negative number or NaN is rejected with an
@@ -310,17 +341,20 @@ heldFor :: Interval -> Seconds -> Interval
 heldFor s seconds =
   checked "heldFor" seconds `seq` s
     { intervalWords = intervalWords s ++ " for over " ++ inSeconds seconds
-    , intervalRanges = \rows -> mapMaybe (later rows) (intervalRanges s rows)
+    , intervalRanges = \record -> mapMaybe (later record) (intervalRanges s record)
     }
  where
-  later rows range
-    | begun < to range = Just range {from = begun, start = (shown, entry {entryTime = due})}
+  later record range
+    | begun < to range && begun < Place (recordEnd record) Before 0 =
+        Just range {from = begun, start = (shown, entry {entryTime = due})}
     | otherwise = Nothing
    where
     (n, entry) = start range
     due = entryTime entry + seconds
-    shown = last (n : map fst (takeWhile (isBy due) (drop n rows)))
-    begun = (shown, 1 + n)
+    -- After all that happens at that time. Those that are due at the same time keep their order.
+    begun = Place (due + tolerance) After (order (from range))
+    shown = last (n : map fst (takeWhile (\row -> at row < begun) (drop n (numbered record))))
+  order (Place _ _ n) = n
 
 infixl 9 `heldFor`
 
@@ -344,20 +378,15 @@ shortlyAfter :: Seconds -> Moment -> Interval
 shortlyAfter seconds m =
   checked "shortlyAfter" seconds `seq` Interval
     { intervalWords = "within " ++ inSeconds seconds ++ " after " ++ momentWords m
-    , intervalNames = momentNames m
-    , intervalRanges = \rows -> [range rows row | row <- occurrences m rows]
+    , intervalNeeds = momentNeeds m
+    , intervalRanges = \record ->
+        [ Range (Place (t - tolerance) Before n) (Place (t + seconds + tolerance) After (-1)) row
+        | row@(n, entry) <- occurrences m record
+        , let t = entryTime entry
+        ]
     }
- where
-  range rows row@(_, entry) =
-    let before = length (takeWhile (not . isBy' (entryTime entry)) rows)
-        through = length (takeWhile (isBy (entryTime entry + seconds)) rows)
-     in Range (before - 1, 1) (through - 1, 1) row
-  isBy' t (_, entry) = entryTime entry >= t - tolerance
 
--- | Whether the entry is not later than this (to a microsecond).
-isBy :: Seconds -> (Int, RecordEntry) -> Bool
-isBy t (_, entry) = entryTime entry <= t + tolerance
-
+-- | Times that differ by less are the same: for example a sum and the time of a timer.
 tolerance :: Seconds
 tolerance = 0.000001
 

@@ -8,7 +8,7 @@ module Behavior.Internal.Mock.Record
   ( Record (..)
   , RecordEntry (..)
   , EntryKind (..)
-  , recorded
+  , inOrder
   , fullName
   , timeline
   , inSeconds
@@ -16,6 +16,7 @@ module Behavior.Internal.Mock.Record
 
 import Data.List (sortOn)
 
+import Behavior.Internal.Mock.Subject (SubjectKind)
 import Behavior.Internal.Runtime (Seconds)
 
 -- | The record of a mock world: what has happened in it, in order. It is shown as a
@@ -23,9 +24,12 @@ import Behavior.Internal.Runtime (Seconds)
 --
 -- @since 0.1.0.0
 data Record = Record
-  { recordSubjects :: [String]
-  -- ^ The names of everything in the world, including those without an entry.
+  { recordSubjects :: [(String, SubjectKind)]
+  -- ^ Everything in the world by its name, including what has no entry.
   , recordEntries :: [RecordEntry]
+  , recordEnd :: Seconds
+  -- ^ The time at which it ends: when the simulated run has ended, or if that goes on, now; on real
+  -- threads the time of the last entry.
   }
   deriving (Eq)
 
@@ -93,12 +97,12 @@ data EntryKind
     Noted
   deriving (Eq, Ord, Show)
 
--- | The record with these names and these entries, given newest first. A thread first
+-- | The entries, given newest first, in the order of their times. A thread first
 -- reads the time and then adds its entry, so the entries of several threads may be added
 -- in a different order than that of their times. Entries with equal times stay in the
 -- order in which they were added.
-recorded :: [String] -> [RecordEntry] -> Record
-recorded names = Record names . sortOn entryTime . reverse
+inOrder :: [RecordEntry] -> [RecordEntry]
+inOrder = sortOn entryTime . reverse
 
 -- | The subject of an entry, with the argument if there is one.
 fullName :: RecordEntry -> String

@@ -17,8 +17,7 @@ module Behavior.Internal.Mock.World
     -- * For what is in the world
   , clock
   , recordEntry
-  , registerName
-  , registerAction
+  , register
   , registerPending
   , checkTimes
 
@@ -38,6 +37,7 @@ import Data.Maybe (fromMaybe, isNothing)
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Mock.Claim (Claim, verdict)
 import Behavior.Internal.Mock.Record
+import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime
 
 -- $setup
@@ -53,9 +53,8 @@ data Mock = Mock
   { beginning :: IORef (Maybe Beginning)
   , misuse :: IORef (Maybe ErrorCall)
   -- ^ The error of a use in another run than its own: that run may have lost it.
-  , names :: IORef [String]
-  , actions :: IORef [String]
-  -- ^ Those of the names that are an action's.
+  , subjects :: IORef [(String, SubjectKind)]
+  -- ^ Newest first.
   , newestEntries :: IORef [RecordEntry]
   -- ^ Newest first.
   , pendingChanges :: IORef [Seconds -> STM [RecordEntry]]
@@ -75,7 +74,7 @@ data Beginning = Beginning
 --
 -- @since 0.1.0.0
 newMock :: IO Mock
-newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef [] <*> newIORef []
+newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
 
 -- | Starts the clock of the world, if it is not running yet. Without this it starts when the first
 -- action begins, or when a condition is read, watched or set for the first time.
@@ -106,7 +105,7 @@ clock mock = do
   here <- simulatedRun
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
   (own, isFirst) <- atomicModifyIORef' (beginning mock) $ \begun -> let it = fromMaybe first begun in (Just it, (it, isNothing begun))
-  when isFirst (readIORef (actions mock) >>= announce)
+  when isFirst (readIORef (subjects mock) >>= announceActions)
   unless (ownRun own == ownRun first) $ do
     writeIORef (misuse mock) (Just (belongsTo own first))
     throwIO (belongsTo own first)
@@ -141,20 +140,18 @@ note mock text = do
   (zero, t) <- clock mock
   mask_ $ recordEntry mock (RecordEntry (t - zero) text "" 1 Noted)
 
--- | Registers the name of something in the world. Each name can be used only once.
-registerName :: Mock -> String -> String -> IO ()
-registerName mock kind name = do
-  taken <- atomicModifyIORef' (names mock) $ \old ->
-    if name `elem` old then (old, True) else (name : old, False)
+-- | Registers something by its name, which only one thing in the world can have. Actions belong to the
+-- coverage of the runs.
+register :: Mock -> SubjectKind -> String -> IO ()
+register mock kind name = do
+  taken <- atomicModifyIORef' (subjects mock) $ \old ->
+    if any ((== name) . fst) old then (old, True) else ((name, kind) : old, False)
   when taken . throwIO . ErrorCall $
-    kind ++ " " ++ show name ++ ": something else in this world has this name already"
+    kindName kind ++ " " ++ show name ++ ": something else in this world has this name already"
+  announceActions [(name, kind)]
 
--- | Registers an action, which belongs to the coverage of the runs.
-registerAction :: Mock -> String -> IO ()
-registerAction mock name = do
-  registerName mock "action" name
-  atomicModifyIORef' (actions mock) (\old -> (name : old, ()))
-  announce [name]
+announceActions :: [(String, SubjectKind)] -> IO ()
+announceActions these = announce [name | (name, kind) <- these, kind `elem` anyAction]
 
 -- | Registers how to find the changes of a condition that are due by a given time but not
 -- recorded yet.
@@ -188,13 +185,15 @@ happened mock = do
   seen <- readIORef (newestEntries mock)
   conditions <- readIORef (pendingChanges mock)
   came <- readIORef (beginning mock) >>= maybe (pure 0) elapsed
-  due <- atomically (traverse ($ maximum (came : map entryTime seen)) conditions)
-  known <- readIORef (names mock)
-  pure (recorded (reverse known) (reverse (join due) ++ seen))
+  let ended = maximum (came : map entryTime seen)
+  due <- atomically (traverse ($ ended) conditions)
+  known <- readIORef (subjects mock)
+  pure (Record (reverse known) (inOrder (reverse (join due) ++ seen)) ended)
 
 -- | Throws a 'BrokenClaim' with the reason, unless the claim holds for the record. Use it
 -- like an expectation of hspec.
 --
+-- >>> begin mock
 -- >>> mock `shouldRecord` eventually (noted "all is well")
 -- *** Exception: This does not hold: eventually "all is well" is noted.
 -- It never came.
@@ -205,9 +204,9 @@ shouldRecord :: Mock -> Claim -> IO ()
 shouldRecord mock claim = do
   record <- happened mock
   begun <- readIORef (beginning mock)
-  either (throwIO . BrokenClaim) pure (verdict claim record)
   when (isNothing begun) . throwIO . BrokenClaim $
     "Nothing has used this world, so there is no record to hold. If that is right, begin it: simulate (begin world >> ...)"
+  either (throwIO . BrokenClaim) pure (verdict claim record)
 
 infix 1 `shouldRecord`
 
