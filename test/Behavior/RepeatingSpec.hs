@@ -16,7 +16,14 @@ import Test.QuickCheck hiding (Failure)
 
 import Behavior
 import Behavior.Sim
-  (SimOptions (..), Outcome (..), Run (outcome), Schedule (Seeded), defaultSimOptions, explain, simulateWith)
+  ( SimOptions (..)
+  , Outcome (..)
+  , Run (outcome)
+  , Schedule (Seeded)
+  , defaultSimOptions
+  , explain
+  , simulateWith
+  )
 import Behavior.Time
 import Support
 

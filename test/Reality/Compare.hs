@@ -17,7 +17,13 @@ module Reality.Compare
 
 import Control.Concurrent (yield)
 import Control.Exception
-  (Exception (..), asyncExceptionFromException, asyncExceptionToException, evaluate, throwIO, try)
+  ( Exception (..)
+  , asyncExceptionFromException
+  , asyncExceptionToException
+  , evaluate
+  , throwIO
+  , try
+  )
 import Control.Monad (void)
 import Data.IORef
 import Data.Set (Set)

@@ -113,7 +113,9 @@ data Abandoned
 
 instance Show Abandoned where
   show = \case
-    StillRuns limit -> "abandoning: a behaviour that has not ended " ++ show limit ++ " s after its stop was requested is abandoned, and still runs"
+    StillRuns limit ->
+      "abandoning: a behaviour that has not ended " ++ show limit
+        ++ " s after its stop was requested is abandoned, and still runs"
     HasEnded Nothing -> "abandoning: a behaviour that was abandoned has ended"
     HasEnded (Just e) -> "abandoning: a behaviour that was abandoned has ended with " ++ show e
 

@@ -89,7 +89,13 @@ withInbox size subscribe behavior = do
   when (size < 1) . throwIO . ErrorCall $
     "withInbox: an inbox has room for at least 1 message, not " ++ show size
   messages <- newTVarIO Seq.empty
-  inbox <- Inbox size messages <$> (pure <$> newTVarIO 0) <*> newTVarIO 0 <*> newTVarIO 0 <*> newTVarIO True <*> pure Nothing
+  inbox <-
+    Inbox size messages
+      <$> (pure <$> newTVarIO 0)
+      <*> newTVarIO 0
+      <*> newTVarIO 0
+      <*> newTVarIO True
+      <*> pure Nothing
   let close = atomically (writeTVar (isOpen inbox) False)
   bracket (subscribe (atomically . deliver inbox)) (close `finally`) (\_ -> behavior inbox)
 
@@ -225,7 +231,8 @@ handleNext inbox handle = mask $ \restore ->
 handleTaken :: Inbox e -> (e -> Behavior (STM a)) -> Message e -> Behavior a
 handleTaken inbox handle message@(Message _ e) =
   maybe id (\(name, render) -> Span.named (name ++ ": " ++ render e)) (called inbox) $
-    (handle e >>= \commit -> atomically (commit <* isHandled)) `onException` atomically (isHandled >> putBack inbox message)
+    (handle e >>= \commit -> atomically (commit <* isHandled))
+      `onException` atomically (isHandled >> putBack inbox message)
  where
   isHandled = for_ (handling inbox) (`modifyTVar'` subtract 1)
 

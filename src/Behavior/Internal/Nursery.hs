@@ -117,7 +117,9 @@ serveRequests nursery scope body = do
   let -- How many were forked, and at which number the scope is to forget those that have ended. That
       -- walks over all of them, so it waits for as many forks as there are branches left.
       serve count sweepAt = do
-        next <- atomically (asum [Left . endedBy "body" <$> outcome main, Left . thrown <$> readLeftmost failure, Right <$> requested])
+        next <-
+          atomically $
+            asum [Left . endedBy "body" <$> outcome main, Left . thrown <$> readLeftmost failure, Right <$> requested]
         case next of
           Left verdict -> pure verdict
           Right new -> do
@@ -132,12 +134,15 @@ serveRequests nursery scope body = do
         Fork act accepted -> do
           let n = count + 1 :: Int
           -- Masked: a branch that was started is also handed over.
-          mask_ $ branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act >>= atomically . putTMVar accepted
+          mask_ $
+            branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act
+              >>= atomically . putTMVar accepted
           pure n
   serve 0 16
  where
   thrown (n, e) = Verdict (SiblingFailed ("fork " ++ show n)) (throwIO e)
-  requested = readTVar (requests nursery) >>= \new -> check (not (null new)) >> reverse new <$ writeTVar (requests nursery) []
+  requested =
+    readTVar (requests nursery) >>= \new -> check (not (null new)) >> reverse new <$ writeTVar (requests nursery) []
 
 -- | What a child has thrown, unless it was stopped.
 thrownBy :: Outcome a -> Maybe SomeException

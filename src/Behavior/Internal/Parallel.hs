@@ -151,8 +151,10 @@ firstOf behaviors = structured "firstOf" $ \scope -> do
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
 allOf behaviors = structured "allOf" $ \scope -> do
   failure <- newLeftmost
-  branches <- startAll (\n -> branchWithHook (publishFailure failure n) scope (Label "allOf" (show n))) (toList behaviors)
-  let awaitAll [] = pure (Verdict (SiblingFinished "all") (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches))
+  branches <-
+    startAll (\n -> branchWithHook (publishFailure failure n) scope (Label "allOf" (show n))) (toList behaviors)
+  let awaitAll [] =
+        pure (Verdict (SiblingFinished "all") (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches))
       awaitAll (b : bs) = do
         failing <-
           tryReadThenBlock ((Nothing <$) <$> completedNow b) . atomically $
@@ -216,11 +218,13 @@ decide choose behaviors =
       Right known -> do
         check (IntMap.size known > IntMap.size seen || count == 0)
         let verdict = Verdict (newEnds (known IntMap.\\ seen))
-        (chosenOf ends known verdict <$> (pure $! choose (inOrder known))) `catchSTM` \e -> pure (pure (verdict (throwIO (e :: SomeException))))
+        (chosenOf ends known verdict <$> (pure $! choose (inOrder known)))
+          `catchSTM` \e -> pure (pure (verdict (throwIO (e :: SomeException))))
   chosenOf ends known verdict = \case
     Just chosen -> pure (verdict (pure chosen))
     Nothing
-      | IntMap.size known == count -> pure (verdict (throwIO (ErrorCall "decide: all behaviours have ended, and the function has chosen none")))
+      | IntMap.size known == count ->
+          pure (verdict (throwIO (ErrorCall "decide: all behaviours have ended, and the function has chosen none")))
       | otherwise -> chooseAfter ends known
   inOrder known = [IntMap.lookup n known | n <- [1 .. count]]
   count = length behaviors
@@ -263,7 +267,8 @@ agreeing m agree behaviors = decide choose behaviors
  where
   choose ends
     | Just results <- among m known = Just (pure results)
-    | isNothing (among (m - running) known) = Just (failWith ("no " ++ show m ++ " of " ++ show (length behaviors) ++ " agree"))
+    | isNothing (among (m - running) known) =
+        Just (failWith ("no " ++ show m ++ " of " ++ show (length behaviors) ++ " agree"))
     | otherwise = Nothing
    where
     known = [a | Just (Right a) <- ends]
@@ -287,7 +292,8 @@ addEnd ends n end = modifyTVar' ends $ case (end, result end) of
 
 -- | Why the rest is stopped when these branches have ended: they failed, or not all of them did.
 newEnds :: IntMap (Either BehaviorFailed a) -> Cause
-newEnds new = (if all isLeft new then SiblingFailed else SiblingFinished) (intercalate ", " (map show (IntMap.keys new)))
+newEnds new =
+  (if all isLeft new then SiblingFailed else SiblingFinished) (intercalate ", " (map show (IntMap.keys new)))
 
 -- | The container with its elements replaced by those of the list, which has as many.
 refilled :: Traversable t => t x -> [a] -> t a

@@ -126,7 +126,11 @@ enter = do
 leave :: (Int, TVar State) -> IO ()
 leave (n, state) = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
   end <- readTVarIO state
-  let left = known {runs = filter ((/= n) . fst) (runs known), pending = if end == Taken then Nothing else pending known}
+  let left =
+        known
+          { runs = filter ((/= n) . fst) (runs known)
+          , pending = if end == Taken then Nothing else pending known
+          }
   if null (runs left) then nothingRuns <$ restore left else pure left
  where
   restore left = do

@@ -91,9 +91,11 @@ resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
 -- >>> progress <- newTVarIO (Map.empty :: Map.Map Int [String])
 -- >>> tries <- newTVarIO (0 :: Int)
 -- >>> let jammed = atomically (modifyTVar' tries (+ 1) >> (< 2) <$> readTVar tries)
--- >>> let step name = putStrLn name >> if name == "lift" then jammed >>= \is -> if is then failed else pure () else pure ()
+-- >>> let lift = jammed >>= \is -> if is then failed else pure ()
+-- >>> let step name = putStrLn name >> if name == "lift" then lift else pure ()
 -- >>> let orders deliver = pure () <$ deliver 7
--- >>> withInbox 5 orders $ \inbox -> attempt 2 (handleNext inbox (\n -> resumableFor progress n ["fetch", "lift", "bring"] step))
+-- >>> let carryOut order = resumableFor progress order ["fetch", "lift", "bring"] step
+-- >>> withInbox 5 orders $ \inbox -> attempt 2 (handleNext inbox carryOut)
 -- fetch
 -- lift
 -- lift

@@ -134,7 +134,8 @@ start = startWith Inherited pure (\_ -> pure ())
 --
 -- (The inlining here is chosen so that the dispatch costs nothing.)
 startWith :: Placement -> (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)
-startWith placement finish hook label act = inSimulation (startReally placement finish hook label act) (startSimulated finish hook label act)
+startWith placement finish hook label act =
+  inSimulation (startReally placement finish hook label act) (startSimulated finish hook label act)
 {-# INLINE startWith #-}
 
 startReally :: Placement -> (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> IO (Thread r)

@@ -178,7 +178,10 @@ stopAll (Scope branches) state cause before = do
   fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
  where
   withFault (thrown, faults) (SomeBranch b) = do
-    (thrown', o) <- tryReadThenBlock (fmap ((,) thrown) <$> tryReadOutcome b) (interruptibleOnce thrown (atomically (outcome b)))
+    (thrown', o) <-
+      tryReadThenBlock
+        (fmap ((,) thrown) <$> tryReadOutcome b)
+        (interruptibleOnce thrown (atomically (outcome b)))
     pure $! case o of
       Faulted e -> (thrown', e : faults)
       _ -> (thrown', faults)

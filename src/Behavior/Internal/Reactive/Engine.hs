@@ -69,7 +69,10 @@ react name signal toReaction = do
   opened <- open (suppressEqual signal) everyValue
   structured name $ \within -> do
     here <- myPlace
-    startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction, place = here} FirstRead Nothing
+    startOver
+      Engine {operator = name, scope = within, source = opened, reaction = toReaction, place = here}
+      FirstRead
+      Nothing
 
 -- | Starts the sensors, reads the signal, and does what its value requires. (The values are those of
 -- the decision before.)
@@ -174,8 +177,10 @@ interrupt engine sensors name running next decision = case next of
   stopBranch others = orReported decision $ do
     end <- stopIt others
     (,) end <$> hasStopped (result end) decision
-  stopIt others =
-    requestStopAsync (cause decision) others >> requestStop (cause decision) [SomeBranch running] >> awaitOutcome running
+  stopIt others = do
+    requestStopAsync (cause decision) others
+    requestStop (cause decision) [SomeBranch running]
+    awaitOutcome running
   readAgain = do
     seen <- atomically (view (source engine))
     (,) seen <$> atomically (readWakeup engine sensors seen (reread seen))

@@ -211,4 +211,5 @@ orReason condition = Signal $ \demand -> do
   pure (reason (nub (names source)) <$> source)
  where
   reason _ True = Nothing
-  reason these False = Just (intercalate ": " ("the condition does not hold" : [intercalate ", " these | not (null these)]))
+  reason these False =
+    Just (intercalate ": " ("the condition does not hold" : [intercalate ", " these | not (null these)]))

@@ -56,7 +56,9 @@ import Behavior.Internal.Signal.Source
 -- >>> let step name = atomically (readTVar paused >>= check . not) >> sleep 1 >> putStrLn name
 -- >>> let setPaused to = putStrLn (if to then "pause" else "resume") >> atomically (writeTVar paused to)
 -- >>> let person = sleep 1.5 >> atomically (writeTVar near True) >> sleep 5 >> atomically (writeTVar near False)
--- >>> _ <- simulate (both person (Signal.pausedWhile (Signal.watching (readTVar near)) (setPaused True) (setPaused False) (mapM_ step ["one", "two", "three"])))
+-- >>> let steps = mapM_ step ["one", "two", "three"]
+-- >>> let work = Signal.pausedWhile (Signal.watching (readTVar near)) (setPaused True) (setPaused False) steps
+-- >>> _ <- simulate (both person work)
 -- one
 -- pause
 -- two

@@ -73,7 +73,9 @@ instance Functor Signal where
 instance Applicative Signal where
   pure a = Signal (\_ -> pure (pure a))
   f <*> a = Signal $ \demand ->
-    (<*>) <$> open f everyValue {readingTimes = readingTimes demand} <*> open a everyValue {readingTimes = readingTimes demand}
+    (<*>)
+      <$> open f everyValue {readingTimes = readingTimes demand}
+      <*> open a everyValue {readingTimes = readingTimes demand}
 
 -- | What a consumer needs of a source.
 data Demand a = Demand
@@ -188,7 +190,9 @@ data Worker = Worker
 --
 -- @since 0.1.0.0
 watching :: STM a -> Signal a
-watching transaction = Signal . const . pure . fromView . pure $ View transaction (transaction `orElse` noValueAnyMore) (pure [])
+watching transaction =
+  Signal . const . pure . fromView . pure $
+    View transaction (transaction `orElse` noValueAnyMore) (pure [])
  where
   noValueAnyMore = failWith "the signal has no value any more"
 
@@ -234,7 +238,8 @@ unlessNamed name = inTrace $ \source ->
 conditionOfRule :: Int -> Signal Bool -> Signal Bool
 conditionOfRule n = inTrace (\source -> source {view = ofRule <$> view source}) . unlessNamed ("condition " ++ show n)
  where
-  ofRule seen = seen {readings = (\holds -> map (\r -> r {readingRule = Just (n, holds)})) <$> reread seen <*> readings seen}
+  ofRule seen = seen {readings = says <$> reread seen <*> readings seen}
+  says holds = map (\r -> r {readingRule = Just (n, holds)})
 
 -- | The signal, whose source is changed if there is a trace when it is opened.
 inTrace :: (Source a -> Source a) -> Signal a -> Signal a
@@ -245,7 +250,8 @@ inTrace change signal = Signal $ \demand -> do
 
 -- | The view whose readings include its value.
 showing :: String -> (a -> String) -> View a -> View a
-showing name render seen = seen {readings = (\before a -> before ++ [Reading name (render a) Nothing]) <$> readings seen <*> reread seen}
+showing name render seen =
+  seen {readings = (\before a -> before ++ [Reading name (render a) Nothing]) <$> readings seen <*> reread seen}
 
 -- | The threads that run for a source, from left to right.
 type Sensors = [Branch ()]

@@ -98,7 +98,8 @@ explore plan property =
 
 -- | 'explore' that returns the counterexample.
 --
--- >>> found <- tryExplore (exhaustively 1) (\simulate -> simulate (sleep 1) >>= \run -> if finished run > 0 then fail "late" else pure ())
+-- >>> let inTime run = if finished run > 0 then fail "late" else pure ()
+-- >>> found <- tryExplore (exhaustively 1) (\simulate -> simulate (sleep 1) >>= inTime)
 -- >>> either failingSchedule (error . show) found
 -- Preempting []
 --
@@ -114,10 +115,19 @@ tryExplore plan property = case planSearch plan of
     | limit < 1 -> refused "an exhaustive plan has at least 1 schedule" limit
     | otherwise -> fullSearch k limit
   Replay s -> only s $ \e t ->
-    pure Counterexample {failingSchedule = s, failingException = e, failingSteps = happened t, failingEvents = traceOfRun t, schedulesTried = 1, foundBy = plan}
+    pure (counterexample s e t 1)
   Shrink s -> only s (reduced 1)
  where
   o = planOptions plan
+  counterexample schedule why trial n =
+    Counterexample
+      { failingSchedule = schedule
+      , failingException = why
+      , failingSteps = happened trial
+      , failingEvents = traceOfRun trial
+      , schedulesTried = n
+      , foundBy = plan
+      }
   try' chooser' = tryRun o chooser' property
   refused why n = throwIO (ErrorCall ("explore: " ++ why ++ ", and not " ++ show n))
   none = Tally 0 0 nothing
@@ -164,7 +174,7 @@ tryExplore plan property = case planSearch plan of
     (fewest, e'') <- simplest fewer e'
     again <- tryRun o {detailedSteps = True} (preempting True fewest) property
     let why = fromMaybe (toException (Unrepeatable (planShowException plan e''))) (thrown again)
-    pure Counterexample {failingSchedule = Preempting fewest, failingException = why, failingSteps = happened again, failingEvents = traceOfRun again, schedulesTried = i, foundBy = plan}
+    pure (counterexample (Preempting fewest) why again i)
 
   -- Leaving out one pre-emption changes the numbers of the later points, so the remaining
   -- pre-emptions may no longer fit. So this searches from the beginning, the schedules with the
@@ -200,7 +210,9 @@ tryExplore plan property = case planSearch plan of
           t <- try' (preempting False candidate)
           case thrown t of
             Just e'
-              | fewer <- deviations t, length fewer < length these -> go (budget - 1) (min chunk (length fewer)) fewer e'
+              | fewer <- deviations t
+              , length fewer < length these ->
+                  go (budget - 1) (min chunk (length fewer)) fewer e'
             _ -> attemptAll (budget - 1) chunk more these why
   without n these = [take i these ++ drop (i + n) these | i <- [0, n .. length these - 1]]
 
@@ -218,7 +230,8 @@ tryRun o choosing property = do
             let deviating = case runSchedule run of
                   Preempting s -> s
                   _ -> []
-            writeIORef made (Just (\thrown' -> Trial thrown' deviating (steps run) (events run) (runPoints run) (runScripted run)))
+            writeIORef made . Just $ \thrown' ->
+              Trial thrown' deviating (steps run) (events run) (runPoints run) (runScripted run)
             case outcome run of
               BlockedOutside _ _ -> improper run
               ExternalWakeup _ -> improper run
@@ -231,7 +244,8 @@ tryRun o choosing property = do
   case (end, trial) of
     (Right (), Just simulated) -> pure (simulated Nothing)
     (Right (), Nothing) -> throwIO . ErrorCall $
-      "explore: the property has simulated nothing, so it shows nothing: it is given a function, and has to simulate with it"
+      "explore: the property has simulated nothing, so it shows nothing: \
+      \it is given a function, and has to simulate with it"
     (Left e, _)
       | isCancellation e -> throwIO e
       | otherwise -> pure (fromMaybe (\thrown' -> Trial thrown' [] [] [] 0 []) trial (Just e))

@@ -126,7 +126,9 @@ instance Show Report where
   show r =
     show (reportSchedules r) ++ " schedules of " ++ show (reportPoints r) ++ " points in all"
       ++ (if reportComplete r then "" else ", and there are more")
-      ++ (if null (reportNeverStarted r) then "" else "; none of them started " ++ intercalate ", " (map show (reportNeverStarted r)))
+      ++ (if null (reportNeverStarted r) then "" else "; none of them started " ++ neverStarted)
+   where
+    neverStarted = intercalate ", " (map show (reportNeverStarted r))
 
 -- | A schedule under which the property does not hold.
 --

@@ -46,7 +46,8 @@ explain = \case
   Cancelled e -> "it was cancelled: " ++ text e
   Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
   Livelock labels circles ->
-    intercalate "\n  " (("livelock: the virtual time does not advance while these threads run: " ++ commas labels) : circles)
+    intercalate "\n  " $
+      ("livelock: the virtual time does not advance while these threads run: " ++ commas labels) : circles
   OutOfTime waiting -> listed "the virtual time has come to the end that was set" waiting
   BlockedOutside name blocked -> show name ++ " waited outside of the simulation, " ++ waitAndAdvice blocked
   ExternalWakeup waiting ->
@@ -138,7 +139,9 @@ renderSteps made = unlines (concatMap (map line . take 1) (groupBy repeated made
 
 -- | The thread's number, its label, and the number of the branch that it is inside.
 thread :: Step -> String
-thread s = show (stepThread s) ++ " " ++ show (stepLabel s) ++ (if stepParent s > 0 then " (of " ++ show (stepParent s) ++ ")" else "")
+thread s = show (stepThread s) ++ " " ++ show (stepLabel s) ++ inside
+ where
+  inside = if stepParent s > 0 then " (of " ++ show (stepParent s) ++ ")" else ""
 
 -- | Only the steps of the threads with the given numbers.
 --

@@ -54,7 +54,8 @@ simulation n sim =
           then throwTo target e
           else unlessUnwinding $ throwAt sim (Just me) there e >>= mapM_ (untilRaised there)
     , send = \target e -> withTarget target $ \me there ->
-        void (enlist sim (taskNumber me) (Label "interrupt" "helper") Nothing (Before MaskedUninterruptible (Throwing there e)))
+        void . enlist sim (taskNumber me) (Label "interrupt" "helper") Nothing $
+          Before MaskedUninterruptible (Throwing there e)
     , transact = transaction sim
     , clock = operation sim AlwaysEnabled >> readIORef (time sim)
     , await = \moment -> do

@@ -134,15 +134,18 @@ simulationNumber = unsafePerformIO (newIORef 0)
 
 -- | The trace of a run, in virtual time.
 traceOf :: Sim -> IO Trace
-traceOf sim = withReceiver Receiver {firstNumber = 1, needsDetail = True, receiveEvent = keep} <$> newTrace (readIORef (time sim))
+traceOf sim = withReceiver receiver <$> newTrace (readIORef (time sim))
  where
+  receiver = Receiver {firstNumber = 1, needsDetail = True, receiveEvent = keep}
   keep event = event `seq` modifyIORef' (emitted sim) (event :)
 
 -- | The outcome, from how the run was ended, the behaviour's result, and the rest of the schedule.
 outcomeOf :: Maybe (Outcome Void) -> Maybe (Either SomeException a) -> [(Int, Int)] -> Outcome a
 outcomeOf cutOff end rest = case (cutOff, rest, end) of
   (Just other, _, _) -> absurd <$> other
-  (Nothing, (p, thread) : _, _) -> ScheduleMismatch ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
+  (Nothing, (p, thread) : _, _) ->
+    ScheduleMismatch
+      ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
   (Nothing, [], Just (Right a)) -> Returned a
   (Nothing, [], Just (Left e))
     | isFailure e -> Failing e

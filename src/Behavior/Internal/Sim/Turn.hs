@@ -164,9 +164,10 @@ waitingTasks sim these = do
     pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- all', isNothing (sender p)]
   toReceive target = show (taskLabel target) ++ " to receive an exception"
   reason alive task = \case
-    Before _ (Transaction _ _) -> case [show (taskLabel t) | t <- alive, parent t == taskNumber task, isJust (taskThread t)] of
-      [] -> "a transaction"
-      branches -> "its branches: " ++ commas branches
+    Before _ (Transaction _ _) ->
+      case [show (taskLabel t) | t <- alive, parent t == taskNumber task, isJust (taskThread t)] of
+        [] -> "a transaction"
+        branches -> "its branches: " ++ commas branches
     Before _ (Moment _) -> "the end of its sleep"
     Before _ (Delivery target _) -> toReceive target
     _ -> "its turn"

@@ -97,7 +97,9 @@ check sim before = do
           when (waits seen >= 400) (void (tryPutMVar (driverTurn sim) ()))
           if waits seen < 100
             then pure seen
-            else waitingTasks sim ((/= taskNumber runner) . taskNumber) >>= \waiting -> endWith (BlockedOutside (taskLabel runner) (how waiting)) seen
+            else
+              waitingTasks sim ((/= taskNumber runner) . taskNumber) >>= \waiting ->
+                endWith (BlockedOutside (taskLabel runner) (how waiting)) seen
       | otherwise -> pure sample {atPoint = n, waits = 0}
  where
   Seconds allowed = realTimeLimit (options sim)

@@ -98,7 +98,11 @@ decide here operator branch before after = do
 -- first. A sink's thread does that.)
 changesBetween :: Values -> Values -> [Change]
 changesBetween before after =
-  nub [Change (readingName r) (readingText <$> Map.lookup key was) (readingText r) | (key, r) <- numbered after, decides (Map.lookup key was) r]
+  nub
+    [ Change (readingName r) (readingText <$> Map.lookup key was) (readingText r)
+    | (key, r) <- numbered after
+    , decides (Map.lookup key was) r
+    ]
  where
   was = Map.fromList (numbered before)
   decides old r = maybe True (\(n, _) -> (old >>= readingRule) /= readingRule r && n <= firstHolding) (readingRule r)
@@ -131,7 +135,8 @@ hasStopped end decision = maybe (pure decision) stopped (unreported decision)
       how <- endOf end
       t <- traceClock (trace (place what))
       let at = reactionTime (known what)
-          branch = StoppedBranch {stoppedName = name, stoppedAfter = at - since, stoppingTook = t - at, stoppedEnd = how}
+          branch =
+            StoppedBranch {stoppedName = name, stoppedAfter = at - since, stoppingTook = t - at, stoppedEnd = how}
       pure decision {unreported = Just what {known = (known what) {reactionStopped = Just branch}}}
 
 -- | Reports the reaction, and which branch starts.

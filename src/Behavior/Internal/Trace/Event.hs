@@ -180,7 +180,14 @@ traverseTexts f = \case
     FromOutside text -> FromOutside <$> f text
     WasAbandoned -> pure WasAbandoned
   inReaction r =
-    (\operator changes stopped starts -> r {reactionOperator = operator, reactionChanges = changes, reactionStopped = stopped, reactionStarts = starts})
+    ( \operator changes stopped starts ->
+        r
+          { reactionOperator = operator
+          , reactionChanges = changes
+          , reactionStopped = stopped
+          , reactionStarts = starts
+          }
+    )
       <$> f (reactionOperator r)
       <*> traverse inChange (reactionChanges r)
       <*> traverse inStopped (reactionStopped r)

@@ -107,7 +107,8 @@ newTrace time = (\n -> Trace n time False []) <$> newIORef 0 <*> newMVar ()
 
 -- | The trace with one more receiver.
 withReceiver :: Receiver -> Trace -> Trace
-withReceiver receiver t = t {receivers = receiver : receivers t, recordsDetail = needsDetail receiver || recordsDetail t}
+withReceiver receiver t =
+  t {receivers = receiver : receivers t, recordsDetail = needsDetail receiver || recordsDetail t}
 
 -- | The place at the top of a trace.
 top :: Trace -> Parent -> Place
@@ -139,7 +140,9 @@ placeOf thread = cellOf thread >>= maybe (pure Nothing) readIORef
 -- | Runs the action in that place. Call it masked, and unmask the action.
 inPlace :: Maybe Place -> IO a -> IO a
 inPlace place act =
-  myThreadId >>= cellOf >>= maybe inNewCell (\cell -> readIORef cell >>= \before -> inCell cell (writeIORef cell before))
+  myThreadId
+    >>= cellOf
+    >>= maybe inNewCell (\cell -> readIORef cell >>= \before -> inCell cell (writeIORef cell before))
  where
   inCell cell leave = do
     writeIORef cell place

@@ -97,7 +97,13 @@ data Stage
 -- | Starts the thread of a sink.
 start :: Int -> Sink -> IO Running
 start n destination = do
-  running <- Running <$> newIORef (Queue Busy 0 [] 0 0) <*> newEmptyMVar <*> newEmptyMVar <*> newIORef 0 <*> newIORef False
+  running <-
+    Running
+      <$> newIORef (Queue Busy 0 [] 0 0)
+      <*> newEmptyMVar
+      <*> newEmptyMVar
+      <*> newIORef 0
+      <*> newIORef False
   add threads 1
   running <$ mask_ (forkIOWithUnmask (work running))
  where
@@ -128,7 +134,9 @@ emit limit running event = do
 -- each batch it waits for ten milliseconds, so that it is seldom woken.
 drain :: Running -> Sink -> IO ()
 drain running destination = do
-  q <- change $ \q -> (Queue {stage = if isEmpty q && stage q == Busy then Idle else stage q, size = 0, newestFirst = [], dropped = 0, taken = produced q}, q)
+  q <- change $ \q ->
+    let next = if isEmpty q && stage q == Busy then Idle else stage q
+     in (Queue {stage = next, size = 0, newestFirst = [], dropped = 0, taken = produced q}, q)
   if isEmpty q
     then unless (stage q >= Closed) (awaitWake >> drain running destination)
     else do
@@ -201,7 +209,9 @@ data SinkProblem
 instance Show SinkProblem where
   show = \case
     SinkThrew e -> "withTrace: a sink threw an exception, and receives nothing more: " ++ safeShow (displayException e)
-    SinkLeft limit n -> "withTrace: a sink that was still blocked " ++ show limit ++ " s after the end of the trace is left behind; events lost: " ++ show n
+    SinkLeft limit n ->
+      "withTrace: a sink that was still blocked " ++ show limit
+        ++ " s after the end of the trace is left behind; events lost: " ++ show n
 
 instance Exception SinkProblem
 

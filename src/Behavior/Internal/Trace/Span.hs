@@ -97,7 +97,9 @@ operatorSpan name run body = isTraced >>= \traced -> if traced then operatorInTr
 operatorInTrace :: String -> IO a -> IO a
 operatorInTrace name act =
   myPlace >>= \case
-    Just place | recordsDetail (trace place) -> mask $ \restore -> spanning Operator name place (restore act) >>= either throwIO pure
+    Just place
+      | recordsDetail (trace place) ->
+          mask $ \restore -> spanning Operator name place (restore act) >>= either throwIO pure
     _ -> act
 {-# NOINLINE operatorInTrace #-}
 
@@ -135,7 +137,8 @@ spanning kind name place act = do
 -- abandoned, the span's parent has ended: so its parent is unknown.
 register :: Open -> IO Open
 register open = do
-  inAll <- for (abandonable place) $ \spans -> atomicModifyIORef' spans (\known -> (IntMap.insert (openNumber open) open <$> known, isJust known))
+  inAll <- for (abandonable place) $ \spans ->
+    atomicModifyIORef' spans (\known -> (IntMap.insert (openNumber open) open <$> known, isJust known))
   pure (if and inAll then open else open {openAt = (top (trace place) UnknownParent) {path = path place}})
  where
   place = openAt open
@@ -183,7 +186,8 @@ reportSpan event open = for_ (receivers (trace place)) $ \receiver ->
       , spanKind = openKind open
       , spanName = openName open
       , spanBegan = openSince open
-      , spanReaction = startedBy (positionFor receiver place) >>= \n -> if n < firstNumber receiver then Nothing else Just n
+      , spanReaction =
+          startedBy (positionFor receiver place) >>= \n -> if n < firstNumber receiver then Nothing else Just n
       }
  where
   place = openAt open

@@ -139,7 +139,10 @@ startedText started branch = maybe (nameText branch) quoted started
 
 -- | The same after what was stopped. If nothing was stopped, it says that this is what starts.
 startsText :: Maybe String -> Reaction -> [String]
-startsText started r = [maybe "starts " (const "") (reactionStopped r) ++ startedText started branch | Just branch <- [reactionStarts r]]
+startsText started r =
+  [ maybe "starts " (const "") (reactionStopped r) ++ startedText started branch
+  | Just branch <- [reactionStarts r]
+  ]
 
 -- | The named values after a change, those that others are computed from first.
 --
@@ -167,7 +170,9 @@ differs :: Change -> Bool
 differs c = changeBefore c /= Just (changeAfter c)
 
 changeText :: Change -> String
-changeText c = nameText (changeSignal c) ++ " " ++ inertUpTo 200 (changeAfter c) ++ (if differs c then maybe "" was (changeBefore c) else "")
+changeText c =
+  nameText (changeSignal c) ++ " " ++ inertUpTo 200 (changeAfter c)
+    ++ (if differs c then maybe "" was (changeBefore c) else "")
  where
   was value = " (was " ++ inertUpTo 200 value ++ ")"
 

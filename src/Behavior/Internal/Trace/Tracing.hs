@@ -90,7 +90,12 @@ withTraceOptions options sinks act = do
   before <- readIORef (lastNumber outer)
   mask $ \restore -> do
     running <- for (zip [1 ..] sinks) (uncurry Sink.start)
-    let receiver r = Receiver {firstNumber = before + 1, needsDetail = withOperators options, receiveEvent = Sink.emit (queueLimit options) r}
+    let receiver r =
+          Receiver
+            { firstNumber = before + 1
+            , needsDetail = withOperators options
+            , receiveEvent = Sink.emit (queueLimit options) r
+            }
         whole = foldr (withReceiver . receiver) outer running
         here = maybe (top whole Top) (\place -> place {trace = whole}) around
         inTrace = inPlace (Just here) (restore act)
