@@ -92,7 +92,10 @@ tracing setting =
   , traced "named" 50000 (named "span" succeeds)
   , Case (setting ++ " traced named, the sink blocked") 50000 $ \n -> do
       gate <- newEmptyMVar
-      withTraceOptions defaultTraceOptions {waitAtEnd = 0} [EachEvent (\_ -> takeMVar gate)] (replicateM_ n (named "span" succeeds))
+      withTraceOptions
+        defaultTraceOptions {waitAtEnd = 0}
+        [EachEvent (\_ -> takeMVar gate)]
+        (replicateM_ n (named "span" succeeds))
       putMVar gate ()
   , Case (setting ++ " traced named, by two") 50000 $ \n ->
       inTrace (both (replicateM_ (n `div` 2) (named "span" succeeds)) (replicateM_ (n `div` 2) (named "span" succeeds)))

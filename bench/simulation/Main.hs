@@ -47,7 +47,11 @@ speed = do
  where
   tireless = defaultSimOptions {livelockLimit = maxBound}
   scheduledBy seed = simulateWith defaultSimOptions {scheduled = Seeded seed} mission
-  aDay = Signal.monitor ((< 0) <$> Signal.polling 1 (pure (1 :: Int))) (pure ()) (forM_ [1 .. 1000 :: Int] (const (sleep 86.4)))
+  aDay =
+    Signal.monitor
+      ((< 0) <$> Signal.polling 1 (pure (1 :: Int)))
+      (pure ())
+      (forM_ [1 .. 1000 :: Int] (const (sleep 86.4)))
 
 -- | The live memory after 20,000 schedules and after 200,000, and the highest resident memory.
 memory :: String -> Plan -> IO ()

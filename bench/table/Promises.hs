@@ -47,7 +47,9 @@ manyBranches =
         , n <- [10, 100, 1000]
         ]
       , [operator `of'` 100 `atMost` 60 * microseconds | operator <- ["firstOf", "allOf"]]
-      , ["bare threads, stopped" `of'` n `beside` scaled (n / 2) ("bare threads, stopped" `of'` 2) | n <- [10, 100, 1000]]
+      , [ "bare threads, stopped" `of'` n `beside` scaled (n / 2) ("bare threads, stopped" `of'` 2)
+        | n <- [10, 100, 1000]
+        ]
       , [noTarget (primitive `of'` n) | primitive <- ["asum of Concurrently", "mapConcurrently_"], n <- [10, 100, 1000]]
       ]
 rules =

@@ -65,7 +65,9 @@ commandLine =
 modes :: Parser Mode
 modes =
   flag' (Print renderTree) (long "tree" <> help "print what ran, one inside the other, and how it ended")
-    <|> flag' (Print (renderSummary . summary)) (long "summary" <> help "print where the time went, what interrupted, and what failed")
+    <|> flag'
+      (Print (renderSummary . summary))
+      (long "summary" <> help "print where the time went, what interrupted, and what failed")
     <|> writing "svg" (encodeUtf8 . timeline) "draw the timeline: one SVG file, which a browser shows"
     <|> writing "trace-events" renderTraceEvents "write the trace-event format, for Perfetto, Chrome and speedscope"
     <|> Compare <$> strOption (long "diff" <> metavar "OTHER" <> help "print what another trace has differently")

@@ -73,8 +73,8 @@ commandLine =
         "A robot must enter a room by one of two doors and do its task there, and never \
         \run out of battery: the example of Biggar and Shames, in a mock world."
       <> footer
-        "Exit status: 0 when the task is done, 1 when the robot failed or a file could not be written, 2 for bad options, \
-        \3 for a fault of the world (the battery is flat), 4 when a simulated mission was \
+        "Exit status: 0 when the task is done, 1 when the robot failed or a file could not be written, \
+        \2 for bad options, 3 for a fault of the world (the battery is flat), 4 when a simulated mission was \
         \not over after what would be an hour, 130, 143 or 129 when stopped by SIGINT (Ctrl-C), SIGTERM \
         \or SIGHUP (the terminal was closed). \
         \Of --explore: that of the worst mission."

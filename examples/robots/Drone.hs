@@ -55,5 +55,6 @@ survey :: Drone -> Behavior ()
 survey robot = do
   path <- newTVarIO (firstPath robot)
   let planner = forever (nextPath robot >>= atomically . writeTVar path)
-      flight = Signal.switch (Signal.namedWith "path" (intercalate ", ") (Signal.watching (readTVar path))) (mapM_ (flyTo robot))
+      paths = Signal.namedWith "path" (intercalate ", ") (Signal.watching (readTVar path))
+      flight = Signal.switch paths (mapM_ (flyTo robot))
   film robot ||| planner ||| flight

@@ -49,7 +49,8 @@ fleet shared robots = do
   failWith "no robot is left"
  where
   inService robot =
-    named (name robot) (Signal.insteadWhen (withdrawn robot) (logLine shared (name robot ++ " is withdrawn")) (work shared robot))
+    named (name robot) $
+      Signal.insteadWhen (withdrawn robot) (logLine shared (name robot ++ " is withdrawn")) (work shared robot)
       `catchAny` \fault -> logLine shared (name robot ++ " is out of service: " ++ displayException fault)
 
 -- | Takes orders and carries them out. An order that is interrupted, by the battery or for good, waits
@@ -66,4 +67,7 @@ work shared robot = Signal.monitor (batteryLow robot) (recharge shared robot) (f
 -- | Waits for a free charger, and frees it again, however the charging ends.
 recharge :: Fleet -> Robot -> Behavior ()
 recharge shared robot =
-  bracket_ (named "wait for a charger" (atomically (waitTSem (chargers shared)))) (atomically (signalTSem (chargers shared))) (charge robot)
+  bracket_
+    (named "wait for a charger" (atomically (waitTSem (chargers shared))))
+    (atomically (signalTSem (chargers shared)))
+    (charge robot)

@@ -48,7 +48,10 @@ data Options = Options
 
 commandLine :: ParserInfo Options
 commandLine =
-  info (helper <*> options) (fullDesc <> failureCode 2 <> progDesc "Runs a robot with simulated hardware, for some seconds: it prints what it does.")
+  info (helper <*> options) $
+    fullDesc
+      <> failureCode 2
+      <> progDesc "Runs a robot with simulated hardware, for some seconds: it prints what it does."
  where
   options =
     Options
@@ -103,7 +106,10 @@ pickAndPlaceDemo say = do
           _ -> step say ("move to " ++ show place) 0.5
       , gripper = \grip' -> do
           step say (if grip' == Open then "open" else "close") 0.3
-          holds <- if grip' == Open then pure False else atomically (stateTVar grips (\left -> (take 1 left == [True], drop 1 left)))
+          holds <-
+            if grip' == Open
+              then pure False
+              else atomically (stateTVar grips (\left -> (take 1 left == [True], drop 1 left)))
           set held holds
       , holding = signal held
       , park = step say "park the arm" 0.5

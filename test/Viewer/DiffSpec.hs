@@ -26,7 +26,8 @@ spec = do
     firstDivergence (between mission mended)
       `shouldBe` Just (Divergence 2.4 (path ["mission", "enter room", "front door"]) 1 "failed: locked" "succeeded")
   it "diverge where a failure began, not where it arrived" $
-    (divergedPath <$> firstDivergence (between (inEachOther (FailedWith "x")) (inEachOther Succeeded))) `shouldBe` Just (path ["a", "b"])
+    (divergedPath <$> firstDivergence (between (inEachOther (FailedWith "x")) (inEachOther Succeeded)))
+      `shouldBe` Just (path ["a", "b"])
   it "diverge where one did not run" $
     firstDivergence (between (one "a" 0 1 ++ one "b" 1 2) (one "a" 0 1))
       `shouldBe` Just (Divergence 1 (path ["b"]) 1 "succeeded" "did not run")

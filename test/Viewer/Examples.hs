@@ -56,9 +56,7 @@ mission =
   , Began photo
   , Ended photo 9.4 (StoppedBy low)
   , Ended survey 9.4 (StoppedBy low)
-  , Reacted
-      ( Reaction 8 (Inside 1) "monitor" 9.1 changes (Just (StoppedBranch "task" 3.1 0.3 (StoppedBy low))) (Just "recovery")
-      )
+  , Reacted (Reaction 8 (Inside 1) "monitor" 9.1 changes (Just stopped) (Just "recovery"))
   , Began recharge
   , Ended recharge 28 Succeeded
   , Reacted (Reaction 11 (Inside 1) "monitor" 28 [Change "batteryLow" (Just "True") "False"] Nothing (Just "task"))
@@ -78,6 +76,7 @@ mission =
   survey = Span 5 (Inside 1) Named "survey" 6 Nothing
   photo = Span 6 (Inside 5) Named "photograph the north wall" 7 Nothing
   low = SignalChanged 8 changes
+  stopped = StoppedBranch "task" 3.1 0.3 (StoppedBy low)
   changes = [Change "battery" (Just "100") "9.4", Change "batteryLow" (Just "False") "True"]
   recharge = Span 9 (Inside 1) Named "recharge" 9.4 (Just 8)
   again = Span 12 (Inside 1) Named "survey" 28 (Just 11)
@@ -143,7 +142,7 @@ textInAllPlaces = concat . zipWith one [0 ..]
     within 1 Top Named 0 Nothing 1 (FailedWith text)
       ++ within 2 (Inside (7 * k + 1)) Branch 0.5 Nothing 0.75 (StoppedBy (SiblingFinished text))
       ++ within 3 Top Named 1 Nothing 2 (StoppedBy (SignalChanged (7 * k + 4) changes))
-      ++ [Reacted (Reaction (7 * k + 4) Top text (start + 1.9) changes (Just (StoppedBranch text 0.9 0.1 (FaultedWith text))) (Just text))]
+      ++ [Reacted (Reaction (7 * k + 4) Top text (start + 1.9) changes (Just stopped) (Just text))]
       ++ within 5 Top Named 2 (Just (7 * k + 4)) 2.5 (FaultedWith text)
       ++ within 6 Top Named 2.5 Nothing 3 (StoppedBy (SiblingFailed text))
       ++ within 7 Top Named 3 Nothing 3.5 (StoppedBy (FromOutside text))
@@ -152,6 +151,7 @@ textInAllPlaces = concat . zipWith one [0 ..]
      where
       s = Span (7 * k + n) parent kind text (start + begin) reaction
     changes = [Change text (Just (text ++ "0")) text]
+    stopped = StoppedBranch text 0.9 0.1 (FaultedWith text)
     start = 4 * fromIntegral k :: Seconds
 
 -- | No terminal acts on the character.
@@ -179,11 +179,13 @@ long n = Began root : concatMap round' [1 .. rounds] ++ [Ended root (at (rounds 
       | otherwise = both' j Succeeded
     both' j end = [Began (inner j), Ended (inner j) (at k + fromIntegral j + 0.8) end]
     inner j =
-      Span (base + j) (Inside base) Named (names !! (j - 1)) (at k + fromIntegral j) (if j == 5 && isStopped then Just (base + 9) else Nothing)
+      Span (base + j) (Inside base) Named (names !! (j - 1)) (at k + fromIntegral j) (startedBy j)
+    startedBy j = if j == 5 && isStopped then Just (base + 9) else Nothing
     names = ["drive", "look", "open door", "photograph", "store", "wait"]
     changes = [Change "battery" (Just "100") (show (k `mod` 10))]
+    stopped = StoppedBranch "photograph" 0.8 0 (StoppedBy (SignalChanged (base + 9) changes))
     reaction =
-      [ Reacted (Reaction (base + 9) (Inside base) "monitor" (at k + 4.8) changes (Just (StoppedBranch "photograph" 0.8 0 (StoppedBy (SignalChanged (base + 9) changes)))) (Just "store"))
+      [ Reacted (Reaction (base + 9) (Inside base) "monitor" (at k + 4.8) changes (Just stopped) (Just "store"))
       | isStopped
       ]
 
@@ -201,18 +203,26 @@ sideBySide n = map Began spans ++ [Ended s (10 + fromIntegral (spanNumber s)) Su
 
 -- | One after the other, all of which fail.
 failing :: Int -> [Event]
-failing n = [Ended (Span k Top Named "try" (fromIntegral k) Nothing) (fromIntegral k + 0.9) (FailedWith "nothing there") | k <- [1 .. n]]
+failing n =
+  [ Ended (Span k Top Named "try" (fromIntegral k) Nothing) (fromIntegral k + 0.9) (FailedWith "nothing there")
+  | k <- [1 .. n]
+  ]
 
 -- | Fifty at the same time, with steps one after the other.
 fleet :: Int -> [Event]
-fleet n = [Began (robot k) | k <- [1 .. 50]] ++ [Ended (step k j) (fromIntegral j + 0.99) Succeeded | k <- [1 .. 50], j <- [1 .. n `div` 50]]
+fleet n =
+  [Began (robot k) | k <- [1 .. 50]]
+    ++ [Ended (step k j) (fromIntegral j + 0.99) Succeeded | k <- [1 .. 50], j <- [1 .. n `div` 50]]
  where
   robot k = Span k Top Named ("robot " ++ show k) 0 Nothing
   step k j = Span (50 * j + k) (if k <= 30 then Inside k else UnknownParent) Named "step" (fromIntegral j) Nothing
 
 -- | One after the other, with all outcomes in turn.
 mixed :: Int -> [Event]
-mixed n = [Ended (Span k Top Named "try" (fromIntegral k) Nothing) (fromIntegral k + 1) end | (k, end) <- zip [1 .. n] (cycle outcomes)]
+mixed n =
+  [ Ended (Span k Top Named "try" (fromIntegral k) Nothing) (fromIntegral k + 1) end
+  | (k, end) <- zip [1 .. n] (cycle outcomes)
+  ]
  where
   outcomes = [Succeeded, FailedWith "no", FaultedWith "no", StoppedBy WasAbandoned, FailedWith "no", Succeeded]
 
@@ -223,8 +233,9 @@ interrupted n = concatMap one [1 .. n]
   one k =
     [ Began (s k)
     , Ended (s k) (fromIntegral k + 1) (StoppedBy (SignalChanged (2 * k + 1) [change]))
-    , Reacted (Reaction (2 * k + 1) Top "select" (fromIntegral k + 0.9) [change] (Just (StoppedBranch "a" 0.9 0.1 (StoppedBy (SignalChanged (2 * k + 1) [change])))) (Just "a"))
+    , Reacted (Reaction (2 * k + 1) Top "select" (fromIntegral k + 0.9) [change] (Just stopped) (Just "a"))
     ]
    where
     change = Change "obstacle" (Just (show k)) (show (k + 1))
+    stopped = StoppedBranch "a" 0.9 0.1 (StoppedBy (SignalChanged (2 * k + 1) [change]))
   s k = Span (2 * k) Top Named ("a" ++ show k) (fromIntegral k) (if k == 1 then Nothing else Just (2 * k - 1))

@@ -24,16 +24,21 @@ import Behavior.Trace
 import Behavior.Trace.File
 import Viewer.Examples
 
+readPage :: IO Text
+readPage = Text.decodeUtf8 <$> Strict.readFile "docs/trace-format.md"
+
 spec :: Spec
-spec = before (Text.decodeUtf8 <$> Strict.readFile "docs/trace-format.md") . describe "is described by docs/trace-format.md:" $ do
+spec = before readPage . describe "is described by docs/trace-format.md:" $ do
   it "each field that is written is there, and no other one" $ \page ->
     Map.map Map.keysSet (documented page) `shouldBe` Map.map Map.keysSet written
   it "each text that selects how a line is read is there, and no other one" $ \page -> do
-    let selecting = Map.map (Map.filter (not . Set.null) . Map.mapWithKey (\key values -> if key `elem` selectors then values else Set.empty))
+    let ofSelector key values = if key `elem` selectors then values else Set.empty
+        selecting = Map.map (Map.filter (not . Set.null) . Map.mapWithKey ofSelector)
         keep = Map.filter (not . Map.null)
     keep (selecting (documented page)) `shouldBe` keep (selecting written)
   it "its example is a file as this library writes it" $ \page -> do
-    let shownThere = Bytes.fromStrict (Text.encodeUtf8 (Text.unlines (takeWhile (/= "```") (drop 1 (dropWhile (/= "```json") (Text.lines page))))))
+    let shown = takeWhile (/= "```") . drop 1 . dropWhile (/= "```json") . Text.lines
+        shownThere = Bytes.fromStrict (Text.encodeUtf8 (Text.unlines (shown page)))
     case parseTrace shownThere of
       Right (h, events, Nothing) -> do
         renderTrace h events `shouldBe` shownThere
@@ -73,7 +78,9 @@ fieldsOf kind (Object o) =
     "end" -> fieldsOf "An end" value
     "cause" -> fieldsOf "A cause" value
     "stopped" -> fieldsOf "A stopped branch" value
-    "changes" | Array changes <- value -> Map.unionsWith (Map.unionWith Set.union) (map (fieldsOf "A change") (toList changes))
+    "changes"
+      | Array changes <- value ->
+          Map.unionsWith (Map.unionWith Set.union) (map (fieldsOf "A change") (toList changes))
     _ -> Map.empty
 fieldsOf _ _ = Map.empty
 
@@ -85,11 +92,19 @@ documented = Map.fromList . mapMaybe section . drop 1 . Text.splitOn "\n## "
     title : rest | rows@(_ : _) <- mapMaybe row rest -> Just (title, Map.fromList rows)
     _ -> Nothing
   row line = case Text.splitOn " | " line of
-    field : meaning | Just name <- Text.stripPrefix "| `" field >>= Text.stripSuffix "`" -> Just (name, values name (Text.concat meaning))
+    field : meaning
+      | Just name <- Text.stripPrefix "| `" field >>= Text.stripSuffix "`" ->
+          Just (name, values name (Text.concat meaning))
     _ -> Nothing
   values name meaning
     | "as in `began`" `Text.isInfixOf` meaning = same name
-    | otherwise = Set.fromList [value | part <- Text.splitOn "`\"" meaning, (value, end) <- [Text.breakOn "\"`" part], not (Text.null end)]
+    | otherwise =
+        Set.fromList
+          [ value
+          | part <- Text.splitOn "`\"" meaning
+          , (value, end) <- [Text.breakOn "\"`" part]
+          , not (Text.null end)
+          ]
   same name = case name of
     "kind" -> Set.fromList ["named", "operator", "branch"]
     "parent" -> Set.fromList ["top", "unknown"]

@@ -37,7 +37,9 @@ undamaged :: Event -> Event
 undamaged event = case event of
   Began s -> Began (inSpan s)
   Ended s t end -> Ended (inSpan s) t end
-  Reacted r -> let n = from1 (reactionNumber r) in Reacted r {reactionNumber = n, reactionParent = below n (reactionParent r)}
+  Reacted r ->
+    let n = from1 (reactionNumber r)
+    in Reacted r {reactionNumber = n, reactionParent = below n (reactionParent r)}
   Lost n -> Lost (from1 n)
  where
   inSpan s = let n = from1 (spanNumber s) in s {spanNumber = n, spanParent = below n (spanParent s)}
@@ -96,7 +98,8 @@ anyTime :: Gen Seconds
 anyTime =
   oneof
     [ realToFrac <$> (arbitrary :: Gen Double)
-    , elements [0, 1 / 0, -1 / 0, 1e300, -1e300, 5e-324, 1.7976931348623157e308, 0.1 + 0.2, 1e15, 123456789.123456789, 1e-9]
+    , elements
+        [0, 1 / 0, -1 / 0, 1e300, -1e300, 5e-324, 1.7976931348623157e308, 0.1 + 0.2, 1e15, 123456789.123456789, 1e-9]
     , (* 1e9) . realToFrac <$> (arbitrary :: Gen Double)
     ]
 
@@ -124,11 +127,24 @@ likelyEvents = sized $ \n -> do
   concat <$> mapM event [1 .. count]
  where
   event k = do
-    s <- Span k <$> parent k <*> elements [minBound .. maxBound] <*> name <*> time <*> frequency [(4, pure Nothing), (1, Just <$> choose (1, 40))]
+    s <-
+      Span k
+        <$> parent k
+        <*> elements [minBound .. maxBound]
+        <*> name
+        <*> time
+        <*> frequency [(4, pure Nothing), (1, Just <$> choose (1, 40))]
     took <- time
     how <- end
     r <- reaction
-    elements [[Began s], [Began s, Ended s (spanBegan s + took) how], [Ended s (spanBegan s + took) how], [Reacted r], [Began s, Reacted r], [Lost 3]]
+    elements
+      [ [Began s]
+      , [Began s, Ended s (spanBegan s + took) how]
+      , [Ended s (spanBegan s + took) how]
+      , [Reacted r]
+      , [Began s, Reacted r]
+      , [Lost 3]
+      ]
   parent k = frequency [(5, Inside <$> choose (max 1 (k - 4), k)), (2, pure Top), (1, pure UnknownParent)]
   name = frequency [(5, elements ["drive", "look around", "open the front door", "x"]), (1, elements oddTexts)]
   time = frequency [(6, realToFrac <$> choose (0, 60 :: Double)), (1, pure 0), (1, pure 0.000001)]
@@ -137,7 +153,16 @@ likelyEvents = sized $ \n -> do
       [ (4, pure Succeeded)
       , (1, FailedWith <$> name)
       , (1, FaultedWith <$> name)
-      , (2, StoppedBy <$> oneof [SignalChanged <$> choose (1, 40) <*> changes, SiblingFinished <$> name, SiblingFailed <$> name, TimeLimit <$> time, FromOutside <$> name, pure WasAbandoned])
+      , (2, StoppedBy <$> stop)
+      ]
+  stop =
+    oneof
+      [ SignalChanged <$> choose (1, 40) <*> changes
+      , SiblingFinished <$> name
+      , SiblingFailed <$> name
+      , TimeLimit <$> time
+      , FromOutside <$> name
+      , pure WasAbandoned
       ]
   changes = resize 3 (listOf (Change <$> name <*> frequency [(1, pure Nothing), (3, Just <$> name)] <*> name))
   reaction =

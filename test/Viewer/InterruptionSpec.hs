@@ -15,11 +15,14 @@ import Viewer.Xml
 spec :: Spec
 spec = do
   it "is described with the names of the spans" $
-    inTree patrol `shouldBe` ["battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
+    inTree patrol
+      `shouldBe` ["battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
   it "is described in the same words in the terminal" $
-    inTerminal patrol `shouldBe` ["battery 9.4 -> batteryLow True", "stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
+    inTerminal patrol
+      `shouldBe` ["battery 9.4 -> batteryLow True", "stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
   it "is described in the same words in the timeline" $
-    inTimeline patrol `shouldBe` ["battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
+    inTimeline patrol
+      `shouldBe` ["battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""]
   it "is described in the same words where operators and branches are shown too" $ do
     inTree detailedPatrol `shouldBe` inTree patrol
     inTerminal detailedPatrol `shouldBe` inTerminal patrol
@@ -30,7 +33,8 @@ spec = do
     inTerminal nameless `shouldBe` ["battery 9.4 -> batteryLow True", text]
     inTimeline nameless `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ text]
   it "is described with the operator's name where no signal has one" $ do
-    inTree (map unnamed nameless) `shouldBe` ["monitor changed -> stopped its task after 3.1 s (took 0.3 s) -> recovery"]
+    inTree (map unnamed nameless)
+      `shouldBe` ["monitor changed -> stopped its task after 3.1 s (took 0.3 s) -> recovery"]
     take 1 (inTerminal (map unnamed nameless)) `shouldBe` ["monitor changed"]
   it "has the time of the span that was stopped, not that of its branch" $ do
     let words' = "stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""
@@ -38,35 +42,46 @@ spec = do
     inTerminal secondStep `shouldBe` ["battery 9.4 -> batteryLow True", words']
     inTimeline secondStep `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ words']
   it "has the time of each span, if they differ" $ do
-    inTree (stoppedAt 60 [57, 55]) `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
-    inTree (stoppedAt 60 [57, 55, 55, 55]) `shouldSatisfy` any ("\"robot 2\" after 5 s, \"robot 3\" after 5 s and 1 more (took" `isInfixOf`)
-    inTerminal (stoppedAt 60 [57, 55]) `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
+    inTree (stoppedAt 60 [57, 55])
+      `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
+    inTree (stoppedAt 60 [57, 55, 55, 55])
+      `shouldSatisfy` any ("\"robot 2\" after 5 s, \"robot 3\" after 5 s and 1 more (took" `isInfixOf`)
+    inTerminal (stoppedAt 60 [57, 55])
+      `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
   it "has no negative time, if a span began while its branch was stopped" $
     inTree (stoppedAt 60 [60.1]) `shouldSatisfy` any ("stopped \"robot 1\" after 0 s (took" `isInfixOf`)
   it "says how long stopping took only if it took a time" $ do
-    let atOnce took end = [if isReaction e then reactionThat (Just (StoppedBranch "task" 3.1 took end)) else e | e <- patrol]
+    let atOnce took end =
+          [if isReaction e then reactionThat (Just (StoppedBranch "task" 3.1 took end)) else e | e <- patrol]
         words' = "battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s -> \"recharge\""
     map (\took -> inTree (atOnce took (low 4))) [0, 0.00001] `shouldBe` [[words'], [words']]
-    inTerminal (atOnce 0 (low 4)) `shouldBe` ["battery 9.4 -> batteryLow True", "stopped \"drive\" after 3.1 s -> \"recharge\""]
+    inTerminal (atOnce 0 (low 4))
+      `shouldBe` ["battery 9.4 -> batteryLow True", "stopped \"drive\" after 3.1 s -> \"recharge\""]
     inTimeline (atOnce 0 (low 4)) `shouldBe` [words']
     inTree (atOnce 0 Succeeded) `shouldSatisfy` any ("after 3.1 s (it completed nevertheless) ->" `isInfixOf`)
   it "says what starts, if nothing was stopped" $ do
     let events = [if isReaction e then reactionThat Nothing else e | e <- patrol]
     inTree events `shouldBe` ["battery 9.4 -> batteryLow True -> starts \"recharge\""]
-    [t | t <- timelineTexts events, "starts" `isInfixOf` t] `shouldBe` ["battery 9.4 -> batteryLow True -> starts \"recharge\""]
+    [t | t <- timelineTexts events, "starts" `isInfixOf` t]
+      `shouldBe` ["battery 9.4 -> batteryLow True -> starts \"recharge\""]
   it "has the names of all spans that were stopped, up to three" $ do
     inTree (several 3) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" after" `isInfixOf`)
-    inTree (several 5) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
-    inTerminal (several 5) `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
+    inTree (several 5)
+      `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
+    inTerminal (several 5)
+      `shouldSatisfy` any ("stopped \"robot 1\", \"robot 2\", \"robot 3\" and 2 more after" `isInfixOf`)
   it "has the first span that was started, if there are several" $ do
     let events = patrol ++ [Began (Span 9 (Inside 1) Named "later" 50 (Just 4))]
     inTree events `shouldBe` inTree patrol
     inTerminal events `shouldBe` inTerminal patrol
   it "has a failure without the words that the library puts before it" $ do
     let failed text = [Ended (Span 1 Top Named "open" 0 Nothing) 1 (FailedWith text)]
-    tree (failed "the behaviour failed: the front door is locked") `shouldSatisfy` any ("open: failed: the front door is locked" `isInfixOf`)
+    tree (failed "the behaviour failed: the front door is locked")
+      `shouldSatisfy` any ("open: failed: the front door is locked" `isInfixOf`)
     tree (failed "the behaviour failed") `shouldSatisfy` ("open: failed" `elem`) . map (drop 23)
-    concatMap (plainTexts . (: [])) (treeLines 30 100 1 (foldl' watch nothingYet (failed "the behaviour failed: the front door is locked")))
+    concatMap
+      (plainTexts . (: []))
+      (treeLines 30 100 1 (foldl' watch nothingYet (failed "the behaviour failed: the front door is locked")))
       `shouldSatisfy` any ("failed: the front door is locked" `isInfixOf`)
  where
   tree = lines . renderTree . recording
@@ -74,11 +89,13 @@ spec = do
 
 -- The texts of reactions in the tree.
 inTree :: [Event] -> [String]
-inTree events = [drop 2 text | line <- lines (renderTree (recording events)), text@('!' : _) <- [dropWhile (/= '!') line]]
+inTree events =
+  [drop 2 text | line <- lines (renderTree (recording events)), text@('!' : _) <- [dropWhile (/= '!') line]]
 
 -- The two lines in the terminal.
 inTerminal :: [Event] -> [String]
-inTerminal events = case dropWhile ((/= "◆ ") . take 2) (map plain (treeLines 30 200 100 (foldl' watch nothingYet events))) of
+inTerminal events =
+  case dropWhile ((/= "◆ ") . take 2) (map plain (treeLines 30 200 100 (foldl' watch nothingYet events))) of
   first : second : _ -> [takeWhile (/= ',') (drop 2 first), drop 2 second]
   _ -> []
 
@@ -105,7 +122,12 @@ reaction = reactionAt 3.1
 
 -- It stops a branch that began at 0.
 reactionAt :: Seconds -> Event
-reactionAt t = Reacted (Reaction 4 (Inside 1) "monitor" t changes (Just (StoppedBranch "task" t 0.3 (low 4))) (Just "recovery"))
+reactionAt = reactionIn (Inside 1)
+
+reactionIn :: Parent -> Seconds -> Event
+reactionIn parent t = Reacted (Reaction 4 parent "monitor" t changes (Just stopped) (Just "recovery"))
+ where
+  stopped = StoppedBranch "task" t 0.3 (low 4)
 
 reactionThat :: Maybe StoppedBranch -> Event
 reactionThat stopped = Reacted (Reaction 4 (Inside 1) "monitor" 3.1 changes stopped (Just "recovery"))
@@ -139,7 +161,7 @@ detailedPatrol =
   , Began drive
   , Ended drive 3.4 (low 4)
   , Ended task 3.4 (low 4)
-  , Reacted (Reaction 4 (Inside 10) "monitor" 3.1 changes (Just (StoppedBranch "task" 3.1 0.3 (low 4))) (Just "recovery"))
+  , reactionIn (Inside 10) 3.1
   , Began recovery
   , Began recharge
   , Ended recharge 60 Succeeded
@@ -181,6 +203,7 @@ several n = stoppedAt 3.1 (replicate n 0)
 
 -- Several spans, each of which began at one of these times.
 stoppedAt :: Seconds -> [Seconds] -> [Event]
-stoppedAt t begins = concat [[Began robot, Ended robot (t + 0.3) (low 4)] | robot <- zipWith robotFrom [1 ..] begins] ++ [reactionAt t]
+stoppedAt t begins =
+  concat [[Began robot, Ended robot (t + 0.3) (low 4)] | robot <- zipWith robotFrom [1 ..] begins] ++ [reactionAt t]
  where
   robotFrom k begin = Span (10 + k) Top Named ("robot " ++ show k) begin Nothing

@@ -33,7 +33,9 @@ import Viewer.Examples
 
 -- | One after the other, a second each.
 legs :: Int -> [Event]
-legs n = concat [ended k Top ("leg " ++ [toEnum (96 + k)]) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. n]]
+legs n = concatMap leg [1 .. n]
+ where
+  leg k = ended k Top ("leg " ++ [toEnum (96 + k)]) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded
 
 -- | Beds are watered; the robot recharges, and goes on.
 watering :: [Event]
@@ -42,13 +44,15 @@ watering =
     ++ ended 2 (Inside 1) "water" 0 Nothing 16 (StoppedBy low)
     ++ concat [bed (2 + k) 2 k (4.5 * fromIntegral (k - 1)) | k <- [1 .. 3]]
     ++ ended 6 (Inside 2) "water bed 4" 13.5 Nothing 16 (StoppedBy low)
-    ++ [Reacted (Reaction 7 (Inside 1) "monitor" 16 changes (Just (StoppedBranch "task" 16 0 (StoppedBy low))) (Just "recovery"))]
+    ++ [Reacted (Reaction 7 (Inside 1) "monitor" 16 changes (Just stopped) (Just "recovery"))]
     ++ ended 8 (Inside 1) "recharge" 16 (Just 7) 24 Succeeded
-    ++ [Reacted (Reaction 9 (Inside 1) "monitor" 24 [Change "battery" (Just "18") "100", Change "batteryLow" (Just "True") "False"] Nothing (Just "task"))]
+    ++ [Reacted (Reaction 9 (Inside 1) "monitor" 24 charged Nothing (Just "task"))]
     ++ ended 10 (Inside 1) "water" 24 (Just 9) 37.5 Succeeded
     ++ concat [bed (7 + k) 10 k (24 + 4.5 * fromIntegral (k - 4)) | k <- [4 .. 6]]
  where
   low = SignalChanged 7 changes
+  stopped = StoppedBranch "task" 16 0 (StoppedBy low)
+  charged = [Change "battery" (Just "18") "100", Change "batteryLow" (Just "True") "False"]
   changes = [Change "battery" (Just "50") "18", Change "batteryLow" (Just "False") "True"]
   bed :: Int -> Int -> Int -> Seconds -> [Event]
   bed n parent k begin = ended n (Inside parent) ("water bed " ++ show k) begin Nothing (begin + 4.5) Succeeded
@@ -58,10 +62,11 @@ doors :: [Event]
 doors =
   locked
     ++ ended 4 (Inside 1) "smash back door" 2 Nothing 2.55 (StoppedBy low)
-    ++ [Reacted (Reaction 5 (Inside 1) "monitor" 2.55 changes (Just (StoppedBranch "task" 2.55 0 (StoppedBy low))) (Just "recovery"))]
+    ++ [Reacted (Reaction 5 (Inside 1) "monitor" 2.55 changes (Just stopped) (Just "recovery"))]
     ++ ended 6 (Inside 1) "recharge" 2.55 (Just 5) 4.5 Succeeded
  where
   low = SignalChanged 5 changes
+  stopped = StoppedBranch "task" 2.55 0 (StoppedBy low)
   changes = [Change "battery" (Just "10") "9"]
 
 -- | The doors are locked.
@@ -76,9 +81,11 @@ buttoned :: [Event]
 buttoned =
   ended 1 Top "mission" 0 Nothing 7 Succeeded
     ++ ended 2 (Inside 1) "load" 0 Nothing 2 Succeeded
-    ++ ended 3 (Inside 1) "drive" 2 Nothing 6 (StoppedBy (SignalChanged 4 changes))
-    ++ [Reacted (Reaction 4 (Inside 1) "insteadWhen" 6 changes (Just (StoppedBranch "branch" 4 0 (StoppedBy (SignalChanged 4 changes)))) (Just "emergency"))]
+    ++ ended 3 (Inside 1) "drive" 2 Nothing 6 cause
+    ++ [Reacted (Reaction 4 (Inside 1) "insteadWhen" 6 changes (Just stopped) (Just "emergency"))]
  where
+  cause = StoppedBy (SignalChanged 4 changes)
+  stopped = StoppedBranch "branch" 4 0 cause
   changes = [Change "red button" (Just "False") "True"]
 
 -- | Five interruptions within two seconds, in a minute.
@@ -90,8 +97,10 @@ crowdedBy :: Int -> Seconds -> [Event]
 crowdedBy n apart = ended 1 Top "mission" 0 Nothing 60 Succeeded ++ concatMap one [1 .. n]
  where
   one k =
-    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) Nothing (at k) (StoppedBy (SignalChanged (3 * k + 1) (changes k)))
-      ++ [Reacted (Reaction (3 * k + 1) (Inside 1) "switch" (at k) (changes k) (Just (StoppedBranch "branch" 0.4 0 (StoppedBy (SignalChanged (3 * k + 1) (changes k))))) (Just "branch"))]
+    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) Nothing (at k) (cause k)
+      ++ [Reacted (Reaction (3 * k + 1) (Inside 1) "switch" (at k) (changes k) (Just (stopped k)) (Just "branch"))]
+  stopped k = StoppedBranch "branch" 0.4 0 (cause k)
+  cause k = StoppedBy (SignalChanged (3 * k + 1) (changes k))
   at k = if k == 0 then 0 else 30 + apart * fromIntegral k
   changes k = [Change "obstacle" (Just (show k)) (show (k + 1))]
 
@@ -101,10 +110,13 @@ robots n = ended 1 Top "mission" 0 Nothing 6 Succeeded ++ concatMap robot [1 .. 
  where
   robot k =
     ended (10 * k) (Inside 1) ("robot " ++ show k) 0 Nothing 6 Succeeded
-      ++ ended (10 * k + 1) (Inside (10 * k)) "drive" 0 Nothing (2 + at k) (StoppedBy (SignalChanged (10 * k + 2) low))
-      ++ [Reacted (Reaction (10 * k + 2) (Inside (10 * k)) "monitor" (2 + at k) low (Just (StoppedBranch "task" (2 + at k) 0 (StoppedBy (SignalChanged (10 * k + 2) low)))) (Just "recovery"))]
+      ++ ended (10 * k + 1) (Inside (10 * k)) "drive" 0 Nothing (2 + at k) (cause k)
+      ++ [Reacted (reaction k)]
       ++ ended (10 * k + 3) (Inside (10 * k)) "charge" (2 + at k) (Just (10 * k + 2)) (4 + at k) Succeeded
       ++ ended (10 * k + 4) (Inside (10 * k)) "drive" (4 + 2 * at k) Nothing 6 Succeeded
+  reaction k = Reaction (10 * k + 2) (Inside (10 * k)) "monitor" (2 + at k) low (Just (stopped k)) (Just "recovery")
+  stopped k = StoppedBranch "task" (2 + at k) 0 (cause k)
+  cause k = StoppedBy (SignalChanged (10 * k + 2) low)
   at k = 0.3 * fromIntegral (k `mod` 4) :: Seconds
   low = [Change "battery low" (Just "False") "True"]
 

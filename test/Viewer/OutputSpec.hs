@@ -1,6 +1,6 @@
 -- |
--- What the program prints while the tree is shown, in a terminal: a pseudo terminal in place of the standard output and the
--- standard error of this process.
+-- What the program prints while the tree is shown, in a terminal: a pseudo terminal in place of the standard output and
+-- the standard error of this process.
 module Viewer.OutputSpec (spec) where
 
 import Control.Concurrent (forkIO)
@@ -32,7 +32,8 @@ spec = before_ pseudoTerminals $ do
       sink (take 3 mission)
       forM_ [1 .. 50 :: Int] $ \n -> putStrLn ("out " ++ show n) >> hFlush stdout >> hPutStrLn stderr ("err " ++ show n)
       sink (drop 3 mission)
-    screen output `shouldSatisfy` \shown -> take 100 shown == printed && "\9679 mission" `elem` map (take 9) (drop 100 shown) && length shown > 105
+    screen output `shouldSatisfy` \shown ->
+      take 100 shown == printed && "\9679 mission" `elem` map (take 9) (drop 100 shown) && length shown > 105
 
   it "is lost nowhere, if there is much of it" $ do
     (_, output) <- inTerminal $ \h _ -> withTerminal h $ \sink -> do
@@ -40,7 +41,8 @@ spec = before_ pseudoTerminals $ do
       forM_ [1 .. 100000 :: Int] $ \n -> putStrLn ("line " ++ show n)
     let known = [l | l <- screen output, "line " `isPrefixOf` l]
     -- (A difference is reported briefly.)
-    take 1 [(is, expected) | (is, expected) <- zip known (map (("line " ++) . show) [1 :: Int ..]), is /= expected] `shouldBe` []
+    take 1 [(is, expected) | (is, expected) <- zip known (map (("line " ++) . show) [1 :: Int ..]), is /= expected]
+      `shouldBe` []
     length known `shouldBe` 100000
 
   it "is seen at once, if its line is not complete" $ do
@@ -50,10 +52,12 @@ spec = before_ pseudoTerminals $ do
       seen "name: "
       seen "mission"
       putStrLn "Ann"
-    take 2 (screen output) `shouldSatisfy` \shown -> take 1 shown == ["name: Ann"] && map (take 9) (drop 1 shown) == ["\9679 mission"]
+    take 2 (screen output)
+      `shouldSatisfy` \shown -> take 1 shown == ["name: Ann"] && map (take 9) (drop 1 shown) == ["\9679 mission"]
 
   it "goes on below the tree, if its line is not complete at the end" $ do
-    (_, output) <- inTerminal $ \h _ -> withTerminal h (\sink -> sink (take 3 mission) >> putStr "to be ") >> putStr "continued" >> hFlush stdout
+    (_, output) <- inTerminal $ \h _ ->
+      withTerminal h (\sink -> sink (take 3 mission) >> putStr "to be ") >> putStr "continued" >> hFlush stdout
     last (screen output) `shouldBe` "to be continued"
 
   it "is whole also without an end of the line" $ do
@@ -103,8 +107,8 @@ pseudoTerminals = do
     Right (master, slave) -> closeFd master >> closeFd slave
     Left e -> pendingWith ("there are no pseudo terminals, is /dev/pts mounted? " ++ show (e :: IOException))
 
--- Runs the action with a handle of a terminal, which the standard output and the standard error are too; and with an action that
--- waits until this text has been written to the terminal. Gives all that has been written.
+-- Runs the action with a handle of a terminal, which the standard output and the standard error are too; and with an
+-- action that waits until this text has been written to the terminal. Gives all that has been written.
 inTerminal :: (Handle -> (String -> IO ()) -> IO a) -> IO (a, Bytes.ByteString)
 inTerminal act = within' $ do
   (master, slave) <- openPseudoTerminal
@@ -127,6 +131,7 @@ inTerminal act = within' $ do
       Right bytes | not (Bytes.null bytes) -> atomically (modifyTVar' written (bytes :)) >> collect reader written
       other -> either (\e -> let _ = e :: IOException in pure ()) (const (pure ())) other
   withTerm = bracket (lookupEnv "TERM" <* setEnv "TERM" "xterm") (maybe (unsetEnv "TERM") (setEnv "TERM")) . const
-  redirected slave run = bracket (flushed >> mapM dup [stdOutput, stdError]) back $ \_ -> mapM_ (dupTo slave) [stdOutput, stdError] >> run
+  redirected slave run =
+    bracket (flushed >> mapM dup [stdOutput, stdError]) back $ \_ -> mapM_ (dupTo slave) [stdOutput, stdError] >> run
   back saved = flushed >> forM_ (zip saved [stdOutput, stdError]) (\(s, fd) -> dupTo s fd >> closeFd s)
   flushed = hFlush stdout >> hFlush stderr

@@ -16,7 +16,9 @@ nextNumber :: String -> Maybe (Double, String)
 nextNumber text = case dropWhile (\c -> not (isDigit c || c == '-')) text of
   [] -> Nothing
   '-' : rest -> first negate <$> nextNumber rest
-  rest | (digits, after) <- span (\c -> isDigit c || c == '.') rest -> Just (read (if '.' `elem` digits then digits else digits ++ ".0"), after)
+  rest
+    | (digits, after) <- span (\c -> isDigit c || c == '.') rest ->
+        Just (read (if '.' `elem` digits then digits else digits ++ ".0"), after)
 
 -- | The points of an outline: where they are from left to right, and from top to bottom.
 outline :: String -> ([Double], [Double])

@@ -32,7 +32,8 @@ spec = do
   golden "simulated.jsonl" (renderTrace header low)
   goldenText "simulated-lines.txt" (unlines (map plainLine low))
   goldenText "simulated-tree.txt" (renderTree (recording low))
-  goldenText "simulated-terminal.txt" (unlines (map plain (treeLines 30 100 20 (foldl' watch nothingYet (takeWhile (not . hasEnded "recharge") (withoutOperators low))))))
+  let beforeIt = takeWhile (not . hasEnded "recharge") (withoutOperators low)
+  goldenText "simulated-terminal.txt" (unlines (map plain (treeLines 30 100 20 (foldl' watch nothingYet beforeIt))))
   goldenText "simulated-summary.txt" (renderSummary (summary shown))
   goldenText "simulated-diff.txt" (renderDifference (difference shown (recording (withoutOperators full))))
   golden "simulated-trace-events.json" (renderTraceEvents shown)
@@ -54,7 +55,10 @@ greenhouse charge = do
   named "mission" $
     drain ||| do
       named "enter" (named "front door" (sleep 1 >> failWith "locked") ? named "back door" (sleep 2))
-      Signal.monitor (Signal.named "battery low" ((< 20) <$> level)) recharge (named "water" (mapM_ bed [1 .. 3 :: Int]))
+      Signal.monitor
+        (Signal.named "battery low" ((< 20) <$> level))
+        recharge
+        (named "water" (mapM_ bed [1 .. 3 :: Int]))
       timeout 2 (named "photograph" (sleep 5)) ? pure ()
       firstOf [named "camera" (sleep 3600), named "lidar" (sleep 0.5)]
       named "upload" (throwIO (userError "no radio")) `catch` goOn where

@@ -23,7 +23,7 @@ spec = do
   describe "of no events" (goldenText "empty-summary.txt" (text []))
   it "has the number of runs, their total, median and maximum, and their outcomes" $
     timesOfPath ["mission", "survey"] (times (summary (recording mission)))
-      `shouldSatisfy` maybe False (\t -> runs t == 2 && near (total t) 11.9 && near (median t) 3.4 && near (longest t) 8.5 && outcomes t == [("stopped", 1), ("succeeded", 1)])
+      `shouldSatisfy` maybe False isSurvey
   it "counts each named span once" . property $ \(Related events) ->
     let r = recording events
     in sum (map (runs . snd) (times (summary r))) === length [n | n <- nodes r, spanKind (nodeSpan n) == Named]
@@ -40,18 +40,22 @@ spec = do
   it "counts an interruption by the signal that the operator watches" $
     interruptions (summary (recording mission)) `shouldBe` [("batteryLow", Interruptions 1 0.3)]
   it "counts an interruption whose reaction was lost" $
-    interruptions (summary (recording [e | e <- mission, not (isReaction e)])) `shouldBe` [("batteryLow", Interruptions 1 0)]
+    interruptions (summary (recording [e | e <- mission, not (isReaction e)]))
+      `shouldBe` [("batteryLow", Interruptions 1 0)]
   it "counts no interruption where an operator was waiting" $
     interruptions (summary (recording (take 2 detailed))) `shouldBe` []
   it "has each failure with its path, and how many times there was one" $
-    failures (summary (recording (mission ++ ended 20 Top "try" 41 Nothing 42 (FailedWith "no") ++ ended 21 Top "try" 42 Nothing 43 (FailedWith "no"))))
+    let failed n = ended n Top "try" (fromIntegral n) Nothing (fromIntegral n + 1) (FailedWith "no")
+    in failures (summary (recording (mission ++ failed 41 ++ failed 42)))
       `shouldBe` [ (path ["try"], "failed: no", 2)
                  , (path ["mission", "enter room", "front door"], "failed: locked", 1)
                  , (path ["mission", "survey", "photograph the north wall"], "faulted: camera: no such device", 1)
                  ]
   it "has each failure and fault of a span with a name" . property $ \(Related events) ->
     let r = recording events
-        howMany = length [() | n <- nodes r, spanKind (nodeSpan n) == Named, Just (_, end) <- [nodeEnd n], isFailure end]
+        howMany =
+          length
+            [() | n <- nodes r, spanKind (nodeSpan n) == Named, Just (_, end) <- [nodeEnd n], isFailure end]
     in sum [n | (_, _, n) <- failures (summary r)] === howMany
   it "reports lost events" . property $ \(Related events) (Positive n) ->
     let r = recording (Lost n : events)
@@ -70,12 +74,20 @@ spec = do
     it "the differences" $ shouldGrowLikeIt (work (\r -> renderDifference (difference r r)))
     it "the tree" $ shouldGrowLikeIt (work renderTree)
   it "is made of ten thousand spans in each other" $
-    length (renderSummary (summary (recording (concat [ended n (Inside (n - 1)) "deeper" 0 Nothing 1 Succeeded | n <- [1 .. 10000]]))))
+    let deep = concat [ended n (Inside (n - 1)) "deeper" 0 Nothing 1 Succeeded | n <- [1 .. 10000]]
+    in length (renderSummary (summary (recording deep)))
       `shouldSatisfy` (> 10000)
  where
   text = renderSummary . summary . recording
   timesOfPath names found = lookup (innermostFirst (path names)) [(innermostFirst p, t) | (p, t) <- found]
-  runsOfOneName n = recording (concat [ended k Top "again" (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. n]])
+  isSurvey t =
+    runs t == 2
+      && near (total t) 11.9
+      && near (median t) 3.4
+      && near (longest t) 8.5
+      && outcomes t == [("stopped", 1), ("succeeded", 1)]
+  runsOfOneName n =
+    recording (concat [ended k Top "again" (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded | k <- [1 .. n]])
   -- Bytes, in this thread.
   allocatedBy made = do
     setAllocationCounter 0

@@ -46,15 +46,19 @@ spec = do
   it "says a failure once that came out of several spans" $ do
     let outer = Span 1 Top Named "outer" 0 Nothing
         inner = Span 2 (Inside 1) Named "inner" 0 Nothing
-    shown (treeLines 30 100 3 (after [Began outer, Began inner, Ended inner 1 (FailedWith "locked"), Ended outer 1 (FailedWith "locked")]))
+        events = [Began outer, Began inner, Ended inner 1 (FailedWith "locked"), Ended outer 1 (FailedWith "locked")]
+    shown (treeLines 30 100 3 (after events))
       `shouldBe` [ "✗ outer failed after 1 s: locked"
                  , "  ✗ inner failed after 1 s: locked"
                  , "✗ inner: failed: locked in outer, 2.0 s ago"
                  ]
 
   it "shows no span as running whose end was lost, once its parent has ended" $ do
-    let [a, b, c] = [Span 1 Top Named "a" 0 Nothing, Span 2 (Inside 1) Named "b" 0 Nothing, Span 3 (Inside 2) Named "c" 0 Nothing]
-    filter ("●" `isInfixOf`) (shown (treeLines 30 80 2 (after [Began a, Began b, Began c, Lost 2, Ended a 1 Succeeded])))
+    let a = Span 1 Top Named "a" 0 Nothing
+        b = Span 2 (Inside 1) Named "b" 0 Nothing
+        c = Span 3 (Inside 2) Named "c" 0 Nothing
+        events = [Began a, Began b, Began c, Lost 2, Ended a 1 Succeeded]
+    filter ("●" `isInfixOf`) (shown (treeLines 30 80 2 (after events)))
       `shouldBe` []
 
   prop "is no wider and no higher than the window, and contains nothing that a terminal obeys" $

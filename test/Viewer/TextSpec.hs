@@ -31,8 +31,11 @@ spec = do
   describe "a summary of odd texts" (goldenText "odd-summary.txt" (renderSummary (summary (recording oddOnes))))
   it "of a megabyte are shortened, with a remark" $ do
     let huge = replicate 1048576 'x'
-        events = ended 1 Top huge 0 Nothing 1 (FailedWith huge) ++ ended 2 Top huge 0 Nothing 1 (StoppedBy (SignalChanged 3 [Change huge Nothing huge])) ++ [reaction huge]
-        reaction text = Reacted (Reaction 3 Top text 0.5 [Change text (Just text) text] (Just (StoppedBranch text 0.5 0.5 Succeeded)) (Just text))
+        events =
+          ended 1 Top huge 0 Nothing 1 (FailedWith huge)
+            ++ ended 2 Top huge 0 Nothing 1 (StoppedBy (SignalChanged 3 [Change huge Nothing huge]))
+            ++ [Reacted (Reaction 3 Top huge 0.5 [Change huge (Just huge) huge] (Just stopped) (Just huge))]
+        stopped = StoppedBranch huge 0.5 0.5 Succeeded
         made =
           [ renderTree (recording events)
           , renderSummary (summary (recording events))

@@ -23,9 +23,11 @@ import Viewer.Temporary
 
 spec :: Spec
 spec = around withMissions $ do
-  it "prints the tree" $ \folder -> run [folder </> "mission", "--tree"] `shouldReturn` (ExitSuccess, renderTree (recording mission), "")
+  it "prints the tree" $ \folder ->
+    run [folder </> "mission", "--tree"] `shouldReturn` (ExitSuccess, renderTree (recording mission), "")
   it "prints the summary" $ \folder ->
-    run [folder </> "mission", "--summary"] `shouldReturn` (ExitSuccess, renderSummary (summary (recording mission)), "")
+    run [folder </> "mission", "--summary"]
+      `shouldReturn` (ExitSuccess, renderSummary (summary (recording mission)), "")
   it "prints the differences" $ \folder ->
     run [folder </> "mission", "--diff", folder </> "mended"]
       `shouldReturn` (ExitSuccess, renderDifference (difference (recording mission) (recording mended)), "")
@@ -49,25 +51,38 @@ spec = around withMissions $ do
     remarks `shouldSatisfy` isInfixOf (": line " ++ show (length mission + 2) ++ ": incomplete (4 bytes)")
   it "reports the line of a damaged file, of either side, with status 2" $ \folder -> do
     Bytes.writeFile (folder </> "damaged") (renderTrace header mission <> "{\"ev\n" <> renderTrace header mission)
-    forM_ ["--tree", "--summary"] $ \mode -> run [folder </> "damaged", mode] >>= failsWith (": line " ++ show (length mission + 2) ++ ": ")
-    run [folder </> "mission", "--diff", folder </> "damaged"] >>= failsWith ("damaged: line " ++ show (length mission + 2) ++ ": ")
+    forM_ ["--tree", "--summary"] $ \mode ->
+      run [folder </> "damaged", mode] >>= failsWith (": line " ++ show (length mission + 2) ++ ": ")
+    run [folder </> "mission", "--diff", folder </> "damaged"]
+      >>= failsWith ("damaged: line " ++ show (length mission + 2) ++ ": ")
   it "reports what is no trace, with status 2" $ \folder ->
-    forM_ [("", "line 1: the file is empty"), ("hello", "line 1: this is no trace"), ("{\"format\":\"behavior-trace\",\"version\":2}\n", "line 1: version 2")] $
-      \(content, why) -> do
-        Bytes.writeFile (folder </> "other") content
-        run [folder </> "other", "--tree"] >>= failsWith why
+    forM_
+      [ ("", "line 1: the file is empty")
+      , ("hello", "line 1: this is no trace")
+      , ("{\"format\":\"behavior-trace\",\"version\":2}\n", "line 1: version 2")
+      ]
+      $ \(content, why) -> do
+          Bytes.writeFile (folder </> "other") content
+          run [folder </> "other", "--tree"] >>= failsWith why
   it "reports a file that cannot be read or written, with status 2" $ \folder -> do
     run [folder </> "none", "--tree"] >>= failsWith "none"
     run [folder, "--tree"] >>= failsWith folder
     forM_ ["--trace-events", "--svg"] $ \option ->
       run [folder </> "mission", option, folder </> "none" </> "out"] >>= failsWith "out"
   it "refuses other options, with status 2" $ \folder ->
-    forM_ [[], ["--tree"], [folder </> "mission"], [folder </> "mission", "--tree", "--summary"], [folder </> "mission", "--picture"]] $ 
-      run >=> failsWith "Usage: behavior-trace"
+    forM_
+      [ []
+      , ["--tree"]
+      , [folder </> "mission"]
+      , [folder </> "mission", "--tree", "--summary"]
+      , [folder </> "mission", "--picture"]
+      ]
+      $ run >=> failsWith "Usage: behavior-trace"
   it "explains its options" $ \_ -> do
     (status, printed, _) <- run ["--help"]
     status `shouldBe` ExitSuccess
-    forM_ ["--tree", "--summary", "--svg OUT", "--trace-events OUT", "--diff OTHER"] $ \option -> printed `shouldSatisfy` isInfixOf option
+    forM_ ["--tree", "--summary", "--svg OUT", "--trace-events OUT", "--diff OTHER"] $ \option ->
+      printed `shouldSatisfy` isInfixOf option
  where
   failsWith why (status, printed, remarks) = do
     (status, printed) `shouldBe` (ExitFailure 2, "")

@@ -32,33 +32,40 @@ spec = do
   it "has them with any times and texts" . property $ \(AnyEvents events) -> checked (render events) === []
   it "has each span once, with its own times" . property $ \(Related events) ->
     let r = recording events
-        times n = (name n, micro (spanBegan (nodeSpan n) - begin r), micro (max (spanBegan (nodeSpan n)) (nodeUntil r n) - begin r))
+        times n =
+          let began = spanBegan (nodeSpan n)
+          in (name n, micro (began - begin r), micro (max began (nodeUntil r n) - begin r))
         micro t = realToFrac t * 1000000
         -- One nanosecond later for each begin and end before, at most.
-        near (n, b, e) (m, b', e') = n == m && all (\d -> d >= 0 && d * 500 <= fromIntegral (length (nodes r))) [b' - b, e' - e]
+        near (n, b, e) (m, b', e') =
+          n == m && all (\d -> d >= 0 && d * 500 <= fromIntegral (length (nodes r))) [b' - b, e' - e]
     in case parsed (render events) of
         Left why -> counterexample why False
         Right (spans, _) ->
           let found = sort [(sName c, sBegin c, sEnd c) | c <- spans]
               expected = sort (map times (nodes r))
-          in counterexample (show (expected, found)) (length found == length expected && and (zipWith near expected found))
-  it "has a span on a lane inside those only that it really ran in" . withMaxSuccess 1000 . property $ \(Related events) ->
-    let r = recording events
-        outer = Map.fromList (concatMap (surround []) (roots r))
-        surround above n = (name n, above) : concatMap (surround (name n : above)) (nodeChildren n)
-        strangers spans =
-          [ (a, b)
-          | (a, b) <- pairs spans
-          , sLane a == sLane b
-          , overlapping a b
-          , sName b `notElem` outer Map.! sName a
-          , sName a `notElem` outer Map.! sName b
-          ]
-    in fmap (strangers . fst) (parsed (render events)) === Right []
+          in counterexample
+              (show (expected, found))
+              (length found == length expected && and (zipWith near expected found))
+  it "has a span on a lane inside those only that it really ran in" . withMaxSuccess 1000 . property $
+    \(Related events) ->
+      let r = recording events
+          outer = Map.fromList (concatMap (surround []) (roots r))
+          surround above n = (name n, above) : concatMap (surround (name n : above)) (nodeChildren n)
+          strangers spans =
+            [ (a, b)
+            | (a, b) <- pairs spans
+            , sLane a == sLane b
+            , overlapping a b
+            , sName b `notElem` outer Map.! sName a
+            , sName a `notElem` outer Map.! sName b
+            ]
+      in fmap (strangers . fst) (parsed (render events)) === Right []
   it "has one lane for what runs one after the other" $
     fmap (nub . map sLane . fst) (parsed (render (filter (not . radio) mission))) `shouldBe` Right [1]
   it "has a flow from what was stopped to what was started" $
-    fmap (map (\f -> (fPhase f, fTime f)) . snd) (parsed (render mission)) `shouldBe` Right [("s", 9100000), ("f", 9400000.002)]
+    fmap (map (\f -> (fPhase f, fTime f)) . snd) (parsed (render mission))
+      `shouldBe` Right [("s", 9100000), ("f", 9400000.002)]
   it "has a flow for each span that a reaction started, if it stopped one" $ do
     let low = StoppedBy (SignalChanged 9 [])
         stopped = ended 1 Top "a" 0 Nothing 1 low
@@ -67,22 +74,39 @@ spec = do
     fmap (length . snd) (parsed (render started)) `shouldBe` Right 0
     fmap (length . snd) (parsed (render stopped)) `shouldBe` Right 0
   it "has a flow that leaves a span before its instant event" $ do
-    let made = render (ended 1 Top "a" 0 Nothing 1 (StoppedBy (SignalChanged 9 [])) ++ ended 2 Top "b" 1 (Just 9) 2 Succeeded)
+    let made =
+          render
+            ( ended 1 Top "a" 0 Nothing 1 (StoppedBy (SignalChanged 9 []))
+                ++ ended 2 Top "b" 1 (Just 9) 2 Succeeded
+            )
     fmap (map fTime . take 1 . snd) (parsed made) `shouldBe` Right [999999.998]
     fmap (map (\(_, t, _) -> t)) (reasons made) `shouldBe` Right [999999.999]
   it "marks what has not ended, and shows it until the end of the recording" $
-    fmap (\s -> [(sEnd c, sOutcome c) | c <- fst s, sName c == "radio"]) (parsed (render mission)) `shouldBe` Right [(40000000, "not ended")]
+    fmap (\s -> [(sEnd c, sOutcome c) | c <- fst s, sName c == "radio"]) (parsed (render mission))
+      `shouldBe` Right [(40000000, "not ended")]
   it "has what begins when the span around it ends inside of that span" $ do
-    let spans = ended 1 Top "outer" 0 Nothing 1 Succeeded ++ concat [ended n (Inside 1) "inner" t Nothing t Succeeded | (n, t) <- [(2, 0), (3, 1), (4, 1)]]
+    let spans =
+          ended 1 Top "outer" 0 Nothing 1 Succeeded
+            ++ concat [ended n (Inside 1) "inner" t Nothing t Succeeded | (n, t) <- [(2, 0), (3, 1), (4, 1)]]
     fmap (\s -> [(sName c, sBegin c, sEnd c) | c <- fst s]) (parsed (render spans))
-      `shouldBe` Right [("outer", 0, 1000000.004), ("inner", 0.001, 0.002), ("inner", 1000000, 1000000.001), ("inner", 1000000.002, 1000000.003)]
+      `shouldBe` Right
+        [ ("outer", 0, 1000000.004)
+        , ("inner", 0.001, 0.002)
+        , ("inner", 1000000, 1000000.001)
+        , ("inner", 1000000.002, 1000000.003)
+        ]
   it "has the arrow of a reaction without an escape, which a viewer shows" $
     Bytes.toStrict (render mission) `shouldSatisfy` ("battery 9.4 (was 100) -> batteryLow" `Strict.isInfixOf`)
   it "has no arguments, which would become part of the names" . property $ \(AnyEvents events) ->
     fmap (filter sArguments . fst) (parsed (render events)) === Right []
   it "has why a span failed or was stopped, in the span, just before its end" $
     fmap (map (\(l, t, why) -> (l, t, Text.takeWhile (/= ':') why))) (reasons (render mission))
-      `shouldBe` Right [(1, 2399999.999, "failed"), (1, 9400000, "stopped"), (1, 9399999.999, "stopped"), (1, 30999999.999, "faulted")]
+      `shouldBe` Right
+        [ (1, 2399999.999, "failed")
+        , (1, 9400000, "stopped")
+        , (1, 9399999.999, "stopped")
+        , (1, 30999999.999, "faulted")
+        ]
   it "is made of ten thousand spans at the same time, and of as many in each other" $ do
     let size events = length (either (const []) fst (parsed (render events)))
     size (concat [ended n Top "x" (fromIntegral n) Nothing 20000 Succeeded | n <- [1 .. 10000]]) `shouldBe` 10000
@@ -93,7 +117,8 @@ spec = do
     it "finds equal times" $
       forM_ [[x 1 0 10, x 1 0 4], [x 1 0 10, x 1 4 6], [x 1 0 10, x 1 10 1], [x 1 4 0]] $ \spans ->
         checked (file spans) `shouldSatisfy` any (Text.isInfixOf "equal times")
-    it "allows what is in the other, and what follows it" $ checked (file [x 1 0 10, x 1 1 3, x 1 5 4, x 1 11 1, x 2 5 10]) `shouldBe` []
+    it "allows what is in the other, and what follows it" $
+      checked (file [x 1 0 10, x 1 1 3, x 1 5 4, x 1 11 1, x 2 5 10]) `shouldBe` []
     it "finds flows without an end, or without a beginning" $
       forM_ ["s", "f"] $ \phase ->
         checked (file [x 1 0 10, flow phase 1 1 5]) `shouldSatisfy` any (Text.isInfixOf "both ends")
@@ -101,7 +126,8 @@ spec = do
       checked (file [x 1 0 10, flow "s" 1 1 5, flow "f" 1 2 6]) `shouldSatisfy` any (Text.isInfixOf "outside")
     it "finds flows that lead back in time" $
       checked (file [x 1 0 10, flow "s" 1 1 5, flow "f" 1 1 4]) `shouldSatisfy` any (Text.isInfixOf "back")
-    it "allows a flow from span to span" $ checked (file [x 1 0 10, x 2 6 3, flow "s" 1 1 5, flow "f" 1 2 6]) `shouldBe` []
+    it "allows a flow from span to span" $
+      checked (file [x 1 0 10, x 2 6 3, flow "s" 1 1 5, flow "f" 1 2 6]) `shouldBe` []
     it "finds what is no JSON" $ checked "{" `shouldSatisfy` not . null
  where
   render = renderTraceEvents . recording
@@ -113,7 +139,15 @@ spec = do
   file events = encode (object ["traceEvents" .= (events :: [Value])])
   x :: Int -> Int -> Int -> Value
   x tid ts dur =
-    object ["ph" .= ("X" :: Text), "pid" .= (1 :: Int), "tid" .= tid, "ts" .= ts, "dur" .= dur, "name" .= ("x" :: Text), "cat" .= ("named,succeeded" :: Text)]
+    object
+      [ "ph" .= ("X" :: Text)
+      , "pid" .= (1 :: Int)
+      , "tid" .= tid
+      , "ts" .= ts
+      , "dur" .= dur
+      , "name" .= ("x" :: Text)
+      , "cat" .= ("named,succeeded" :: Text)
+      ]
   flow :: Text -> Int -> Int -> Int -> Value
   flow phase i tid ts = object ["ph" .= phase, "pid" .= (1 :: Int), "id" .= i, "tid" .= tid, "ts" .= ts]
 
@@ -142,8 +176,14 @@ checked :: Bytes.ByteString -> [Text]
 checked content = case parsed content of
   Left why -> ["no trace-event file: " <> Text.pack why]
   Right (spans, flows) ->
-    ["spans overlap: " <> shown (a, b) | (a, b) <- pairs spans, sLane a == sLane b, not (apart a b || inside a b || inside b a)]
-      ++ ["equal times: " <> shown t | t : _ : _ <- group (sort (concat [[(sLane s, sBegin s), (sLane s, sEnd s)] | s <- spans]))]
+    [ "spans overlap: " <> shown (a, b)
+    | (a, b) <- pairs spans
+    , sLane a == sLane b
+    , not (apart a b || inside a b || inside b a)
+    ]
+      ++ [ "equal times: " <> shown t
+         | t : _ : _ <- group (sort (concat [[(sLane s, sBegin s), (sLane s, sEnd s)] | s <- spans]))
+         ]
       ++ concatMap (flowProblems spans) (Map.toList (Map.fromListWith (flip (++)) [(fId f, [f]) | f <- flows]))
  where
   apart a b = sEnd a <= sBegin b || sEnd b <= sBegin a
@@ -158,10 +198,13 @@ flowProblems spans (_, found) = case found of
     | otherwise -> []
   _ -> ["a flow without both ends: " <> shown found]
  where
-  inSpan f = or [sLane s == fLane f && sBegin s <= fTime f && (fTime f < sEnd s || sBegin s == sEnd s && fTime f == sEnd s) | s <- spans]
+  inSpan f = any (\s -> sLane s == fLane f && sBegin s <= fTime f && reaches (fTime f) s) spans
+  reaches t s = t < sEnd s || sBegin s == sEnd s && t == sEnd s
 
 parsed :: Bytes.ByteString -> Either String ([Complete], [Flow])
-parsed content = eitherDecode content >>= parseEither (withObject "file" (\o -> o .: "traceEvents" >>= fmap mconcat . traverse entry))
+parsed content =
+  eitherDecode content
+    >>= parseEither (withObject "file" (\o -> o .: "traceEvents" >>= fmap mconcat . traverse entry))
 
 -- | The lanes, times and names of the instant events.
 reasons :: Bytes.ByteString -> Either String [(Int, Scientific, Text)]
@@ -181,7 +224,14 @@ entry o = do
       begin <- o .: "ts"
       lasts <- o .: "dur"
       categories <- Text.splitOn "," <$> o .: "cat"
-      s <- Complete <$> o .: "tid" <*> pure begin <*> pure (begin + lasts) <*> o .: "name" <*> pure (last categories) <*> pure (KeyMap.member "args" o)
+      s <-
+        Complete
+          <$> o .: "tid"
+          <*> pure begin
+          <*> pure (begin + lasts)
+          <*> o .: "name"
+          <*> pure (last categories)
+          <*> pure (KeyMap.member "args" o)
       if lasts < 0 then fail "negative duration" else pure ([s], [])
     _ | phase `elem` ["M", "i"] -> pure ([], [])
     _ | phase `elem` ["s", "f"] -> (\f -> ([], [f])) <$> (Flow phase <$> o .: "id" <*> o .: "tid" <*> o .: "ts")

@@ -30,7 +30,11 @@ spec = do
     in forAll (shuffle each) $ \other -> renderTree (recording other) === renderTree (recording each)
  where
   tree = renderTree . recording
-  distinct events = [e | (i, e) <- numbered events, all (\(j, f) -> j >= i || number e /= number f || isNothing (number e)) (numbered events)]
+  distinct events =
+    [ e
+    | (i, e) <- numbered events
+    , all (\(j, f) -> j >= i || number e /= number f || isNothing (number e)) (numbered events)
+    ]
   numbered = zip [0 :: Int ..]
   number event = case event of
     Began s -> Just (spanNumber s)

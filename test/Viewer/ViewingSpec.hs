@@ -29,7 +29,8 @@ spec = do
     drawn <- readFile (path ++ ".svg")
     drawn `shouldSatisfy` isInfixOf "drive"
   forM_ [("created", "/no/such/folder/file"), ("written", "/dev/full")] $ \(what, path) ->
-    describe ("with a file that cannot be " ++ what) . forM_ [("the trace", trace path), ("the timeline", picture path)] $ \(which, view) -> do
+    describe ("with a file that cannot be " ++ what) $
+      forM_ [("the trace", trace path), ("the timeline", picture path)] $ \(which, view) -> do
       it (which ++ ": runs the behaviour, then throws what names the file") $ do
         ran <- newIORef False
         (result, printed) <- printedOnStderr (try (viewing view (named "drive" (writeIORef ran True))))
@@ -43,8 +44,10 @@ spec = do
         result <- try (viewEvents view mission)
         (result, "") `shouldSatisfy` isProblem path
   it "names both files, if neither can be written" $ do
-    (result, printed) <- printedOnStderr (try (viewing (Viewing (Just "/dev/full") (Just "/no/such/folder/file") False) (pure ())))
-    map ("/dev/full" `isInfixOf`) (lines printed ++ [either (show :: IOException -> String) show result]) `shouldSatisfy` or
+    (result, printed) <-
+      printedOnStderr (try (viewing (Viewing (Just "/dev/full") (Just "/no/such/folder/file") False) (pure ())))
+    map ("/dev/full" `isInfixOf`) (lines printed ++ [either (show :: IOException -> String) show result])
+      `shouldSatisfy` or
     map ("/no/such/folder/file" `isInfixOf`) (lines printed ++ [either show show result]) `shouldSatisfy` or
   it "draws the timeline of a run that is over, if its trace cannot be written" . withPath $ \path -> do
     void (try (viewEvents (Viewing (Just "/dev/full") (Just path) False) mission) :: IO (Either IOException ()))
@@ -70,7 +73,9 @@ closeBehindIt :: FilePath -> IO ()
 closeBehindIt path = listDirectory folder >>= filterM isOfFile >>= mapM_ (closeFd . read)
  where
   folder = "/proc/self/fd"
-  isOfFile n = either (const False) (== path) <$> (try (getSymbolicLinkTarget (folder ++ "/" ++ n)) :: IO (Either IOException FilePath))
+  isOfFile n =
+    either (const False) (== path)
+      <$> (try (getSymbolicLinkTarget (folder ++ "/" ++ n)) :: IO (Either IOException FilePath))
 
 -- What the action returns, and what is written to stderr meanwhile.
 printedOnStderr :: IO a -> IO (a, String)

@@ -35,7 +35,8 @@ spec = around_ (timeout 20000000 >=> maybe (expectationFailure "not over after 2
   describe "A hundred thousand spans in each other" . forM_ views $ \(view, work) ->
     it view $ evaluate (work (inEachOther 100000 Named Succeeded)) >>= (`shouldSatisfy` (> 0))
   it "A hundred thousand operators in each other leave the spans with names" $
-    length (withoutOperators (inEachOther 100000 Operator Succeeded ++ ended 100001 (Inside 100000) "drive" 0 Nothing 1 Succeeded))
+    let drive = ended 100001 (Inside 100000) "drive" 0 Nothing 1 Succeeded
+    in length (withoutOperators (inEachOther 100000 Operator Succeeded ++ drive))
       `shouldBe` 4
 
 -- Events in which something is of this size.
@@ -44,10 +45,25 @@ shapes =
   [ ("spans in each other", \n -> inEachOther n Named Succeeded)
   , ("spans in each other, all of which fail", \n -> inEachOther n Named (FailedWith "no"))
   , ("operators in each other", \n -> inEachOther n Operator Succeeded)
-  , ("spans in each other that one reaction stops", \n -> inEachOther n Named (StoppedBy (SignalChanged (n + 1) [])) ++ [reaction (n + 1) 1])
-  , ("spans in each other that each outlast the one around", \n -> concat [ended k (outside k) "on" (fromIntegral k) Nothing (fromIntegral (n + k)) Succeeded | k <- [1 .. n]])
-  , ("spans in each other, each with another one at the same time", \n -> concat [ended (2 * k - 1) (if k == 1 then Top else Inside (2 * k - 3)) "on" (time k) Nothing (2 * time n - time k) Succeeded ++ ended (2 * k) (Inside (2 * k - 1)) "beside" (time k) Nothing (time (k + 2)) Succeeded | k <- [1 .. n `div` 2]])
-  , ("spans after each other", \n -> concat [ended k Top "next" (time k) Nothing (time (k + 1)) Succeeded | k <- [1 .. n]])
+  , ( "spans in each other that one reaction stops"
+    , \n -> inEachOther n Named (StoppedBy (SignalChanged (n + 1) [])) ++ [reaction (n + 1) 1]
+    )
+  , ( "spans in each other that each outlast the one around"
+    , \n ->
+        concat
+          [ended k (outside k) "on" (fromIntegral k) Nothing (fromIntegral (n + k)) Succeeded | k <- [1 .. n]]
+    )
+  , ( "spans in each other, each with another one at the same time"
+    , \n ->
+        concat
+          [ ended (2 * k - 1) (outer k) "on" (time k) Nothing (2 * time n - time k) Succeeded
+              ++ ended (2 * k) (Inside (2 * k - 1)) "beside" (time k) Nothing (time (k + 2)) Succeeded
+          | k <- [1 .. n `div` 2]
+          ]
+    )
+  , ( "spans after each other"
+    , \n -> concat [ended k Top "next" (time k) Nothing (time (k + 1)) Succeeded | k <- [1 .. n]]
+    )
   , ("spans at the same time", sideBySide)
   , ("interruptions after each other", interrupted)
   , ("reactions", \n -> ended 1 Top "wait" 0 Nothing (time n) Succeeded ++ [reaction k 1 | k <- [2 .. n]])
@@ -56,7 +72,10 @@ shapes =
   ]
  where
   time = fromIntegral :: Int -> Seconds
-  reaction k p = Reacted (Reaction k (Inside p) "monitor" (time k) [Change "battery" Nothing (show k)] (Just (StoppedBranch "task" 1 0 Succeeded)) Nothing)
+  outer k = if k == 1 then Top else Inside (2 * k - 3)
+  reaction k p =
+    Reacted (Reaction k (Inside p) "monitor" (time k) [Change "battery" Nothing (show k)] (Just stopped) Nothing)
+  stopped = StoppedBranch "task" 1 0 Succeeded
 
 -- The outermost one has a name.
 inEachOther :: Int -> SpanKind -> End -> [Event]

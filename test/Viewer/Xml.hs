@@ -87,7 +87,8 @@ characters ('&' : rest) = case break (== ';') rest of
   ("gt", ';' : after) -> ('>' :) <$> characters after
   ("quot", ';' : after) -> ('"' :) <$> characters after
   ("apos", ';' : after) -> ('\'' :) <$> characters after
-  ('#' : 'x' : digits, ';' : after) | not (null digits), all isHexDigit digits -> reference (fst (head (readHex digits))) after
+  ('#' : 'x' : digits, ';' : after)
+    | not (null digits), all isHexDigit digits -> reference (fst (head (readHex digits))) after
   ('#' : digits, ';' : after) | not (null digits), all isDigit digits -> reference (read digits) after
   _ -> wrong "no reference" rest
  where

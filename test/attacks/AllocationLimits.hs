@@ -32,13 +32,14 @@ attack = forM_ [1 .. 1500 :: Int] $ \k -> forM_ places $ \(place, program) -> do
 
 places :: [(String, Int64 -> IO () -> IO ())]
 places =
-  [ ("the caller", \n act -> limited n >> forever (Time.timeout 0.001 (Signal.monitor (pure False) failed (both act (void (allOf [act, act])))) ? pure ()))
+  [ ("the caller", \n act -> limited n >> forever (Time.timeout 0.001 (nest act) ? pure ()))
   , ("a branch", \n act -> both act (Signal.whileHolding (pure True) (parallel act (using n))) ? pure ())
   , ("a forked child", \n act -> scoped (\nursery -> fork nursery (using n) >> act) ? pure ())
   , ("a sensor", \n act -> monitor (False <$ using n) act act ? pure ())
   , ("a recovery", \n act -> both act (Signal.monitor (pure True) (using n) act) ? pure ())
   ]
  where
+  nest act = Signal.monitor (pure False) failed (both act (void (allOf [act, act])))
   limited n = setAllocationCounter n >> enableAllocationLimit
   using n = do
     limited n

@@ -11,12 +11,14 @@ module Attack
   , endsWithin
   , inThread
   , milliseconds
+  , randomBelow
   , Boom (..)
   ) where
 
 import Control.Concurrent
 import Control.Exception
 import Control.Monad (unless)
+import Data.IORef (atomicModifyIORef', newIORef)
 import Foreign (Ptr, peek)
 import System.Exit (ExitCode (..))
 import System.IO (hFlush, stdout)
@@ -60,6 +62,13 @@ inThread limit what = endsWithin limit what (const (pure ()))
 
 milliseconds :: Int -> IO ()
 milliseconds n = threadDelay (n * 1000)
+
+-- | Random numbers from this seed: each is from zero to below the given one.
+randomBelow :: Int -> IO (Int -> IO Int)
+randomBelow seed = do
+  state <- newIORef seed
+  pure $ \n -> atomicModifyIORef' state $ \s ->
+    let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', (s' `div` 65536) `mod` n)
 
 newtype Boom = Boom Int
   deriving (Eq, Show)

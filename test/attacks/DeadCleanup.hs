@@ -27,7 +27,10 @@ attack =
     , ("with it, masked", operating mask_)
     ]
   operating :: (IO () -> IO ()) -> IO () -> IO ()
-  operating around cleanup = void (try (around (parallel (milliseconds 3600000 `finally` cleanup) (milliseconds 20))) :: IO (Either SomeException ()))
+  operating around cleanup =
+    void (try (around act) :: IO (Either SomeException ()))
+   where
+    act = parallel (milliseconds 3600000 `finally` cleanup) (milliseconds 20)
   again act = act `catch` \BlockedIndefinitelyOnMVar -> again act
   awaiting n woken collecting name = do
     done <- tryTakeMVar woken

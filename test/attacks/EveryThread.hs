@@ -24,8 +24,7 @@ import Behavior.Trace (Sink (..), named, withTrace)
 
 attack :: IO ()
 attack = do
-  seed <- newIORef (31337 :: Int)
-  let below n = atomicModifyIORef' seed (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', (s' `div` 65536) `mod` n))
+  below <- randomBelow 31337
   forM_ [1 .. 1500 :: Int] $ \k -> do
     threads <- newIORef ([] :: [ThreadId])
     caught <- newIORef ([] :: [SomeException])
@@ -61,14 +60,22 @@ attack = do
             2 -> pure (a ? b)
             3 -> pure (firstOf [a, b])
             4 -> pure (void (allOf [a, b]))
-            5 -> pure (scoped (\nursery -> fork nursery a >>= \c -> fork nursery b >> Time.sleep 0.0005 >> requestStop c))
+            5 -> pure . scoped $ \nursery -> do
+              c <- fork nursery a
+              _ <- fork nursery b
+              Time.sleep 0.0005 >> requestStop c
             6 -> never (\alone -> Signal.monitor odd' (alone a) (alone b))
             7 -> never (\alone -> Signal.rSelect watched (alone a) (alone b))
             8 -> pure (void (Time.timeout 0.0007 a) ? b)
-            9 -> never (\alone -> Signal.withShared (Signal.debounce 0.0001 odd') (\s -> Signal.switch s (\i -> alone (if i then a else b))))
-            10 -> pure (withInbox 3 (\deliver -> here (forever (deliver () >> Time.sleep 0.0006))) (\inbox -> onMessage inbox (\() -> pure () <$ a) b))
+            9 -> never $ \alone ->
+              Signal.withShared (Signal.debounce 0.0001 odd') (\s -> Signal.switch s (\i -> alone (if i then a else b)))
+            10 ->
+              let delivers deliver = here (forever (deliver () >> Time.sleep 0.0006))
+              in pure (withInbox 3 delivers (\inbox -> onMessage inbox (\() -> pure () <$ a) b))
             11 -> pure (decide (\ends -> if null [() | Nothing <- ends] then Just (pure ()) else Nothing) [a, b])
-            _ -> pure (withTrace [EachEvent (\_ -> here (pure ()))] (named "traced" (a `finally` Time.cleanupWithin 0.0005 (b ? pure ()))))
+            _ ->
+              let traced = named "traced" (a `finally` Time.cleanupWithin 0.0005 (b ? pure ()))
+              in pure (withTrace [EachEvent (\_ -> here (pure ()))] traced)
         thrower = forever $ do
           known <- readIORef threads
           stops <- readIORef caught
@@ -83,7 +90,10 @@ attack = do
     throwers <- replicateM 2 (forkIO thrower)
     wait <- below 4000
     killer <- newEmptyMVar
-    let last' t = forkIO (threadDelay wait >> mapM_ killThread throwers >> forever (throwTo t ThreadKilled >> threadDelay 20000)) >>= putMVar killer
+    let killing t = do
+          threadDelay wait >> mapM_ killThread throwers
+          forever (throwTo t ThreadKilled >> threadDelay 20000)
+        last' t = forkIO (killing t) >>= putMVar killer
     _ <- endsWithin 20000 what last' program
     takeMVar killer >>= killThread
     killThread changing

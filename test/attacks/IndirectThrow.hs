@@ -24,7 +24,8 @@ attack = do
       t <- mask_ $ forkIOWithUnmask $ \unmask -> void . flip finally (putMVar over ()) $ do
         me <- myThreadId
         try (unmask $ do
-          _ <- around (parallel ((putMVar entered () >> milliseconds 3600000) `finally` indirectly (throwTo me (Boom 1))) (milliseconds 100))
+          let act = (putMVar entered () >> milliseconds 3600000) `finally` indirectly (throwTo me (Boom 1))
+          _ <- around (parallel act (milliseconds 100))
           milliseconds 300) :: IO (Either SomeException ())
       takeMVar entered
       milliseconds 20

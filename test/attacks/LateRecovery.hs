@@ -43,7 +43,10 @@ one k = do
   begun <- newIORef Nothing
   let reading = do
         first <- atomicModifyIORef' isFirst ((,) False)
-        unless first $ uninterruptibleMask_ (atomically (writeTVar sensorMasked True) >> milliseconds 4000 >> writeIORef sensorOver True)
+        unless first . uninterruptibleMask_ $ do
+          atomically (writeTVar sensorMasked True)
+          milliseconds 4000
+          writeIORef sensorOver True
       task = do
         over <- readIORef begun
         when (isNothing over) $ do
@@ -58,5 +61,6 @@ one k = do
     atomically (readTVar sensorMasked >>= check)
     threadDelay (1000 + 100 * k)
     atomically (writeTVar low True)
-  _ <- try (monitor (const <$> watching (readTVar low) <*> polling 0.0005 reading) recovery task) :: IO (Either SomeException ())
+  let sensor = const <$> watching (readTVar low) <*> polling 0.0005 reading
+  _ <- try (monitor sensor recovery task) :: IO (Either SomeException ())
   readIORef begun

@@ -56,8 +56,12 @@ outranked messages robots = do
   when (done /= messages) . broken $ show done ++ " of " ++ show messages ++ " messages were committed"
   starts <- readIORef begun
   interruptions <- readIORef dangers
-  when (starts > messages + interruptions) . broken $ show starts ++ " handlers began, for " ++ show interruptions ++ " interruptions"
-  putStrLn (show robots ++ " robots: " ++ show starts ++ " handlers began for " ++ show messages ++ " messages and " ++ show interruptions ++ " dangers")
+  when (starts > messages + interruptions) . broken $
+    show starts ++ " handlers began, for " ++ show interruptions ++ " interruptions"
+  putStrLn
+    ( show robots ++ " robots: " ++ show starts ++ " handlers began for " ++ show messages ++ " messages and "
+        ++ show interruptions ++ " dangers"
+    )
  where
   add counter = atomicModifyIORef' counter (\n -> (n + 1, ()))
 

@@ -19,12 +19,17 @@ import System.Mem (performMajorGC)
 attack :: IO ()
 attack = do
   forM_ [1 .. 2000 :: Int] $ \k -> do
-    end <- endsWithin 10000 ("race " ++ show k) (\t -> void (forkIO (threadDelay (k `mod` 300) >> throwTo t (Boom k)))) $
+    let throwing t = void (forkIO (threadDelay (k `mod` 300) >> throwTo t (Boom k)))
+    end <- endsWithin 10000 ("race " ++ show k) throwing $
       scoped $ \nursery -> do
-        children <- forM [1 .. 5 :: Int] $ \i -> fork nursery (threadDelay (i * 20) `finally` (fork nursery (pure ()) ? failed))
+        children <- forM [1 .. 5 :: Int] $ \i ->
+          fork nursery (threadDelay (i * 20) `finally` (fork nursery (pure ()) ? failed))
         -- The cleanup of each requests the stop of two children, and awaits the first.
         forM_ (zip children (drop 1 children)) $ \(a, b) ->
-          fork nursery (milliseconds 3600000 `finally` (requestStop a >> requestStop b >> (atomically (void (await a)) ? pure ())))
+          fork nursery $
+            milliseconds 3600000 `finally` do
+              requestStop a >> requestStop b
+              atomically (void (await a)) ? pure ()
         forM_ children requestStop
         forM_ children (\c -> (void (atomically (await c)) ? pure ()) `finally` requestStop c)
     end `seq` pure ()
@@ -45,7 +50,10 @@ attack = do
   putStrLn "stops held" >> hFlush stdout
   enabled <- getRTSStatsEnabled
   _ <- inThread 40000 "many children" $ scoped $ \nursery -> do
-    let some n = replicateM_ n (fork nursery (milliseconds 3600000) >>= \c -> requestStop c >> requestStop c >> (atomically (await c) ? pure ()))
+    let some n = replicateM_ n $ do
+          c <- fork nursery (milliseconds 3600000)
+          requestStop c >> requestStop c
+          atomically (await c) ? pure ()
     some (5000 :: Int)
     before <- resident enabled
     forM_ [1 .. 10 :: Int] $ \_ -> some 5000

@@ -62,11 +62,15 @@ pausing random = do
   current <- newIORef 0
   failing <- random 6
   let alone act = inside current (\n -> promise "a pause and a resume, or two of one, at once" (n == 1) >> act)
-      pause = alone (atomicModifyIORef' counts (\(p, r) -> ((p + 1, r), ())) >> busy random 10 >> when (failing == 0) failed)
+      pause = alone $ do
+        atomicModifyIORef' counts (\(p, r) -> ((p + 1, r), ()))
+        busy random 10
+        when (failing == 0) failed
       resume = alone (atomicModifyIORef' counts (\(p, r) -> ((p, r + 1), ())) >> busy random 5)
       person = forM_ (cycle [True, False]) $ \there -> atomically (writeTVar near there) >> busy random 15
   withAsync person $ \_ -> do
-    _ <- hurt random (Signal.pausedWhile (Signal.watching (readTVar near)) pause resume (replicateM_ 5 (busy random 20)))
+    let task = replicateM_ 5 (busy random 20)
+    _ <- hurt random (Signal.pausedWhile (Signal.watching (readTVar near)) pause resume task)
     (paused, resumed) <- readIORef counts
     promise (show paused ++ " pauses began, and only " ++ show resumed ++ " times it resumed") (resumed >= paused)
 
@@ -120,4 +124,6 @@ agreement random = do
   running <- readIORef current
   promise "a sensor is left" (running == 0)
   forM_ end $ \results ->
-    promise ("not " ++ show m ++ " that agree: " ++ show results) (length results == m && and (zipWith (==) results (drop 1 results)))
+    promise
+      ("not " ++ show m ++ " that agree: " ++ show results)
+      (length results == m && and (zipWith (==) results (drop 1 results)))

@@ -46,7 +46,8 @@ failing :: Int -> Int -> IO ()
 failing delay n = do
   failedAt <- newEmptyMVar
   end <- inThread 20000 "a failure among thousands" . crowd n $ \nursery ->
-    void . fork nursery $ milliseconds delay >> getMonotonicTime >>= putMVar failedAt >> (failWith "one of thousands" :: IO ())
+    void . fork nursery $
+      milliseconds delay >> getMonotonicTime >>= putMVar failedAt >> (failWith "one of thousands" :: IO ())
   case end of
     Left e | Just (FailedBecause why) <- fromException e -> promise "another failure" (why == "one of thousands")
     _ -> broken ("not the failure: " ++ either show show end)

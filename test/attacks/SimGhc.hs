@@ -18,7 +18,8 @@ import Behavior.Time (atomically, timeout)
 
 attack :: IO ()
 attack = forM_ programs $ \(name, fixed, program) -> do
-  simulated <- sort . nub <$> forM [1 .. 2000] (\seed -> simulateWith defaultSimOptions {scheduled = Seeded seed} program >>= run . explained)
+  let once seed = simulateWith defaultSimOptions {scheduled = Seeded seed} program >>= run . explained
+  simulated <- sort . nub <$> forM [1 .. 2000] once
   real <- sort . nub <$> forM [1 .. 300 :: Int] (\_ -> inThread 5000 name program >>= run)
   putStrLn (name ++ ": " ++ show simulated ++ " and really " ++ show real)
   promise (name ++ ": really " ++ show real ++ ", and simulated " ++ show simulated) (all (`elem` simulated) real)
@@ -44,7 +45,10 @@ programs =
   , ("a stop in a masked wait that is there", False, logged $ \write -> do
       v <- newTVarIO False
       parallel
-        (mask_ ((atomically (readTVar v >>= check) >> write "got") `catch` \e -> write "stop" >> throwIO (e :: SomeException)))
+        ( mask_ $
+            (atomically (readTVar v >>= check) >> write "got")
+              `catch` \e -> write "stop" >> throwIO (e :: SomeException)
+        )
         (atomically (writeTVar v True)))
   , ("a child that is stopped before it starts", False, logged $ \write ->
       scoped $ \n -> do
@@ -55,7 +59,10 @@ programs =
   , ("a child that nevertheless completes", True, logged $ \write ->
       scoped $ \n -> do
         started <- newTVarIO False
-        c <- fork n (mask_ (atomically (writeTVar started True) >> (sleep 100 `catch` \(_ :: SomeException) -> pure ()) >> pure "done"))
+        c <- fork n . mask_ $ do
+          atomically (writeTVar started True)
+          sleep 100 `catch` \(_ :: SomeException) -> pure ()
+          pure "done"
         atomically (readTVar started >>= check)
         requestStop c
         atomically (await c) >>= write)
@@ -65,7 +72,9 @@ programs =
   , ("a cleanup that fails, and one that faults", True, logged $ \write -> do
       started <- newTVarIO (0 :: Int)
       let inside = atomically (readTVar started >>= writeTVar started . (+ 1)) >> sleep 100
-      parallel (atomically (readTVar started >>= check . (== 2))) (both (inside `finally` failed) (inside `finally` throwIO (Boom 1)))
+      parallel
+        (atomically (readTVar started >>= check . (== 2)))
+        (both (inside `finally` failed) (inside `finally` throwIO (Boom 1)))
       write "?")
   ]
  where

@@ -5,7 +5,7 @@
 module SimReality (attack) where
 
 import Control.Exception
-import Control.Monad (forM, forM_, void)
+import Control.Monad (forM, forM_, unless, void)
 import Data.List (nub, sort)
 
 import Attack
@@ -35,23 +35,35 @@ programs =
   [ ("watched monitor and a failing task", logged $ \write -> do
       low <- newTVarIO False
       parallel
-        (Signal.monitor (Signal.watching (readTVar low)) (write "r" >> atomically (writeTVar low False)) ((atomically (readTVar low >>= check) >> failed) `finally` write "t"))
+        ( Signal.monitor
+            (Signal.watching (readTVar low))
+            (write "r" >> atomically (writeTVar low False))
+            ((atomically (readTVar low >>= check) >> failed) `finally` write "t")
+        )
         (atomically (writeTVar low True) >> atomically (readTVar low >>= check . not)))
   , ("whileHolding, masked caller, two flags", logged $ \write -> do
       f <- newTVarIO True
       g <- newTVarIO False
-      void (firstOf [ mask_ (Signal.whileHolding (Signal.watching (readTVar f)) ((atomically (readTVar g >>= check) >> write "w") `finally` write "c")) ? write "lost"
-              , atomically (writeTVar f False) >> atomically (writeTVar g True) >> write "x" ]))
+      let act = (atomically (readTVar g >>= check) >> write "w") `finally` write "c"
+      void $
+        firstOf
+          [ mask_ (Signal.whileHolding (Signal.watching (readTVar f)) act) ? write "lost"
+          , atomically (writeTVar f False) >> atomically (writeTVar g True) >> write "x"
+          ])
   , ("fork, stop, await by two", logged $ \write -> scoped $ \n -> do
       v <- newTVarIO False
-      c <- fork n (mask_ (atomically (readTVar v >>= check) `catch` \(e :: SomeException) -> write "s" >> throwIO e) >> write "d")
+      let awaiting = atomically (readTVar v >>= check) `catch` \(e :: SomeException) -> write "s" >> throwIO e
+      c <- fork n (mask_ awaiting >> write "d")
       d <- fork n (requestStop c >> (atomically (await c) ? write "stopped"))
       atomically (writeTVar v True)
       atomically (await d))
   , ("withShared, closed by its end", logged $ \write -> do
       v <- newTVarIO (0 :: Int)
+      let branch k = do
+            write (show k)
+            unless (k == 2) (atomically (readTVar v >>= check . (/= k)) >> write "b")
       Signal.withShared (Signal.watching (readTVar v)) $ \s ->
-        parallel (Signal.switch s (\k -> write (show k) >> if k == 2 then pure () else atomically (readTVar v >>= check . (/= k)) >> write "b"))
+        parallel (Signal.switch s branch)
           (atomically (writeTVar v 1) >> atomically (writeTVar v 2) >> write "w"))
   , ("a fault while stopped by both sides", logged $ \write -> do
       g <- newTVarIO False
@@ -60,7 +72,11 @@ programs =
   , ("teleo rules flip", logged $ \write -> do
       v <- newTVarIO (0 :: Int)
       parallel
-        (Signal.teleoReactive [((== 1) <$> Signal.watching (readTVar v), write "one" `finally` write "1"), (pure True, (atomically (readTVar v >>= check . (== 3)) >> write "three") `finally` write "z")])
+        ( Signal.teleoReactive
+            [ ((== 1) <$> Signal.watching (readTVar v), write "one" `finally` write "1")
+            , (pure True, (atomically (readTVar v >>= check . (== 3)) >> write "three") `finally` write "z")
+            ]
+        )
         (forM_ [1, 2, 3] (atomically . writeTVar v) >> atomically (check False)))
   , ("hysteresis flips", logged $ \write -> do
       v <- newTVarIO (0 :: Int)

@@ -23,12 +23,12 @@ import Behavior.Trace
 
 attack :: IO ()
 attack = do
-  seed <- newIORef (2718 :: Int)
-  let below n = atomicModifyIORef' seed (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', (s' `div` 65536) `mod` n))
+  below <- randomBelow 2718
   handler <- getUncaughtExceptionHandler
   forM_ [1 .. 400 :: Int] $ \k -> do
     reports <- newIORef []
-    setUncaughtExceptionHandler $ \e -> forM_ (fromException e) $ \problem -> atomicModifyIORef' reports (\known -> (problem : known, ()))
+    setUncaughtExceptionHandler $ \e ->
+      forM_ (fromException e) $ \problem -> atomicModifyIORef' reports (\known -> (problem : known, ()))
     counted <- newIORef (0 :: Int)
     gate <- newEmptyMVar
     flag <- newTVarIO (0 :: Int)
@@ -43,7 +43,10 @@ attack = do
             0 -> readMVar gate
             1 -> threadDelay 3000
             2 -> tryReadMVar mission >>= mapM_ (\t -> forkIO (throwTo t (Boom 7)))
-            3 -> void (Time.timeout 0.001 (Signal.monitor ((> 3) <$> Signal.polling 0.0002 (atomically (readTVar flag))) failed (both (Time.sleep 1) (named "in a sink" (Time.sleep 1)))) ? pure ())
+            3 ->
+              let high = (> 3) <$> Signal.polling 0.0002 (atomically (readTVar flag))
+                  task = both (Time.sleep 1) (named "in a sink" (Time.sleep 1))
+              in void (Time.timeout 0.001 (Signal.monitor high failed task) ? pure ())
             4 -> withTrace [EachEvent (\_ -> pure ())] (replicateM_ 5 (named "in a trace of a sink" (pure ())))
             _ -> threadDelay 20 >> yield
         leaf name = do
@@ -73,9 +76,11 @@ attack = do
     program <- below 5 >>= \depth -> tree depth "r"
     wait <- below 4000
     changing <- forkIO (forM_ [1 ..] (\i -> atomically (writeTVar flag i) >> threadDelay 100))
-    let storm t = putMVar mission t >> void (forkIO (threadDelay wait >> replicateM_ 3 (throwTo t ThreadKilled >> threadDelay 200)))
+    let throwing t = threadDelay wait >> replicateM_ 3 (throwTo t ThreadKilled >> threadDelay 200)
+        storm t = putMVar mission t >> void (forkIO (throwing t))
+        counts = EachEvent (\e -> modifyIORef' counted (+ weight e))
     _ <- endsWithin 5000 what storm $
-      withTraceOptions defaultTraceOptions {queueLimit = 1000000, waitAtEnd = 5} [EachEvent (\e -> modifyIORef' counted (+ weight e))] $
+      withTraceOptions defaultTraceOptions {queueLimit = 1000000, waitAtEnd = 5} [counts] $
         withTraceOptions defaultTraceOptions {queueLimit = limit, waitAtEnd = 0.05} (map sinkOf hostile) program
     killThread changing
     produced <- readIORef counted
@@ -83,7 +88,9 @@ attack = do
     left <- (\known -> sum [n | SinkLeft _ n <- known]) <$> readIORef reports
     received <- sum <$> mapM (\(_, _, seen) -> readIORef seen) hostile
     thrown <- length . filter (\case SinkThrew _ -> True; _ -> False) <$> readIORef reports
-    promise (what ++ ": " ++ show received ++ " received or lost, " ++ show left ++ " left of 4 times " ++ show produced) (received + left == 4 * produced && thrown == 0)
+    promise
+      (what ++ ": " ++ show received ++ " received or lost, " ++ show left ++ " left of 4 times " ++ show produced)
+      (received + left == 4 * produced && thrown == 0)
     putMVar gate ()
     noThreads what
   setUncaughtExceptionHandler handler

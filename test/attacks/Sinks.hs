@@ -49,8 +49,7 @@ reportsOf act = do
 -- | Queues of all sizes, sinks that block at some event or are slow: every event is accounted for.
 accounting :: IO ()
 accounting = do
-  seed <- newIORef (99 :: Int)
-  let below n = atomicModifyIORef' seed (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', (s' `div` 65536) `mod` n))
+  below <- randomBelow 99
   forM_ [1 .. 150 :: Int] $ \k -> do
     limit <- (\i -> [0, 1, 2, 7, 30, 1000] !! i) <$> below 6
     blockAt <- (\i n -> if i == 0 then maxBound else n) <$> below 3 <*> below 200
@@ -78,17 +77,26 @@ accounting = do
         -- (In a batch the events behind the one at which the sink blocks have been passed to it, too.)
         whole = length [() | e <- events, notLost e]
         left = sum [n | SinkLeft _ n <- reports]
-    if batches && not (null reports)
-      then promise (what ++ ": received " ++ show whole ++ ", lost " ++ show lost ++ " and " ++ show left ++ " of " ++ show produced) (whole + lost + left <= produced)
-      else promise (what ++ ": received " ++ show whole ++ ", lost " ++ show lost ++ " and " ++ show left ++ " of " ++ show produced) (whole + lost + left == produced)
+        accounted = whole + lost + left
+    promise
+      (what ++ ": received " ++ show whole ++ ", lost " ++ show lost ++ " and " ++ show left ++ " of " ++ show produced)
+      (if batches && not (null reports) then accounted <= produced else accounted == produced)
     forM_ ["a", "b"] $ \name -> do
-      let times = [t | e <- events, t <- [spanBegan s | Began s <- [e], take 1 (spanName s) == name] ++ [t' | Ended s t' _ <- [e], take 1 (spanName s) == name]]
+      let timeIn = \case
+            Began s | take 1 (spanName s) == name -> [spanBegan s]
+            Ended s t _ | take 1 (spanName s) == name -> [t]
+            _ -> []
+          times = concatMap timeIn events
       promise (what ++ ": not in order") (and (zipWith (<=) times (drop 1 times)))
     putMVar gate ()
     noThreads what
     when (not batches && not (null reports)) $ do
       later <- length <$> readIORef received
-      promise (what ++ ": it received " ++ show later ++ " in the end, and " ++ show (length events) ++ " before it was left behind") (later == length events)
+      promise
+        ( what ++ ": it received " ++ show later ++ " in the end, and " ++ show (length events)
+            ++ " before it was left behind"
+        )
+        (later == length events)
  where
   notLost = \case Lost _ -> False; _ -> True
 
@@ -111,15 +119,24 @@ throwing = forM_ exceptions $ \e -> forM_ [1, 2, 7, 42] $ \at -> do
     "result" <$ named "end" (pure ())
   n <- readIORef count
   g <- readIORef good
-  promise ("a sink that throws at " ++ show at ++ ": " ++ show (r, n, g, length reports)) ((r, n, g, [() | SinkThrew _ <- reports]) == ("result", at, 42, [()]))
+  promise
+    ("a sink that throws at " ++ show at ++ ": " ++ show (r, n, g, length reports))
+    ((r, n, g, [() | SinkThrew _ <- reports]) == ("result", at, 42, [()]))
  where
-  exceptions = [toException (Boom 1), toException ThreadKilled, toException (StoppedWithFault undefined undefined), toException (ErrorCall undefined), undefined]
+  exceptions =
+    [ toException (Boom 1)
+    , toException ThreadKilled
+    , toException (StoppedWithFault undefined undefined)
+    , toException (ErrorCall undefined)
+    , undefined
+    ]
 
 -- | A blocked sink delays the end of the trace by 'waitAtEnd', whatever state the caller is in.
 ending :: IO ()
-ending = forM_ (zip [1 :: Int ..] [id, mask_, uninterruptibleMask_]) $ \(k, state) -> forM_ [0, 0.05] $ \limit -> forM_ [False, True] $ \cancelled -> do
+ending = forM_ each $ \(k, state, limit, cancelled) -> do
   gate <- newEmptyMVar
-  let run = withTraceOptions defaultTraceOptions {waitAtEnd = limit} [EachEvent (\_ -> readMVar gate), Batches (\_ -> readMVar gate)] $ do
+  let blocked = [EachEvent (\_ -> readMVar gate), Batches (\_ -> readMVar gate)]
+      run = withTraceOptions defaultTraceOptions {waitAtEnd = limit} blocked $ do
         named "x" (pure ())
         if cancelled && k == 1 then forever (threadDelay 1000000) else threadDelay 20000
         getMonotonicTime
@@ -134,6 +151,13 @@ ending = forM_ (zip [1 :: Int ..] [id, mask_, uninterruptibleMask_]) $ \(k, stat
   promise (what ++ ": reports " ++ show reports) (length [() | SinkLeft _ _ <- reports] == 2)
   putMVar gate ()
   noThreads what
+ where
+  each =
+    [ (k, state, limit, cancelled)
+    | (k, state) <- zip [1 :: Int ..] [id, mask_, uninterruptibleMask_]
+    , limit <- [0, 0.05]
+    , cancelled <- [False, True]
+    ]
 
 -- | A sink that uses 'named' and a trace of its own: what it does is no part of the trace that it
 -- receives, which would never end.
@@ -161,13 +185,15 @@ interrupted = forM_ [1 .. 150 :: Int] $ \k -> do
       count r = atomicModifyIORef' r (\n -> (n + 1, ()))
       spin end = getMonotonicTime >>= \t -> when (t < end) (yield >> spin end)
       awake n = readIORef marked >>= \m -> unless (m == sinks) $ do
-        when (n == (0 :: Int)) . void $ broken ("interrupted, " ++ show k ++ ": of " ++ show sinks ++ " sinks " ++ show (sinks - m) ++ " are not woken")
+        when (n == (0 :: Int)) . void . broken $
+          "interrupted, " ++ show k ++ ": of " ++ show sinks ++ " sinks " ++ show (sinks - m) ++ " are not woken"
         threadDelay 1000 >> awake (n - 1)
   withTrace (replicate sinks sink) $ do
     flag <- newTVarIO False
     over <- newEmptyMVar
     here <- adopt
-    thread <- forkIO ((try (here (Signal.waitUntil (Signal.watching (readTVar flag)))) :: IO (Either SomeException ())) >>= putMVar over)
+    let wait = here (Signal.waitUntil (Signal.watching (readTVar flag)))
+    thread <- forkIO ((try wait :: IO (Either SomeException ())) >>= putMVar over)
     -- Until all of them sleep.
     threadDelay 15000
     began <- getMonotonicTime
@@ -177,7 +203,9 @@ interrupted = forM_ [1 .. 150 :: Int] $ \k -> do
     named "mark" (pure ())
     awake 1000
   n <- readIORef reacted
-  promise ("interrupted, " ++ show k ++ ": " ++ show n ++ " of " ++ show sinks ++ " sinks received the reaction") (n `elem` [0, sinks])
+  promise
+    ("interrupted, " ++ show k ++ ": " ++ show n ++ " of " ++ show sinks ++ " sinks received the reaction")
+    (n `elem` [0, sinks])
  where
   sinks = 400
 
@@ -189,7 +217,8 @@ bounded = forM_ ["blocked", "receiving"] $ \state -> do
   received <- newIORef (0 :: Int)
   let sink e = modifyIORef' received (+ (case e of Lost n -> n; _ -> 1)) >> readMVar gate
       what = "with a " ++ state ++ " sink"
-  (sizes, reports) <- reportsOf . withTraceOptions defaultTraceOptions {queueLimit = 1000, waitAtEnd = if state == "blocked" then 0 else 10} [EachEvent sink] $
+      options = defaultTraceOptions {queueLimit = 1000, waitAtEnd = if state == "blocked" then 0 else 10}
+  (sizes, reports) <- reportsOf . withTraceOptions options [EachEvent sink] $
     forM [1 .. 5 :: Int] $ \_ -> do
       replicateM_ 1000000 (named "x" (pure ()))
       performMajorGC >> gcdetails_live_bytes . gc <$> getRTSStats

@@ -22,10 +22,11 @@ attack = do
     box <- newEmptyMVar
     _ <- forkIO (uninterruptibleMask_ (readMVar gate) `finally` putMVar box ())
     uninterruptibleMask_ (takeMVar box))
-  beside <- sideBySide "20,000 side by side" (\gate -> mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())))
+  let waits gate = mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ()))
+  beside <- sideBySide "20,000 side by side" waits
   one <- waiting "one alone" $ \gate -> do
     done <- newEmptyMVar
-    _ <- forkIO (mask_ (parallel (milliseconds 3600000 `finally` uninterruptibleMask_ (readMVar gate)) (pure ())) `finally` putMVar done ())
+    _ <- forkIO (waits gate `finally` putMVar done ())
     pure (takeMVar done)
   nested <- waiting "1,500 one inside the other" $ \gate -> do
     let nest :: Int -> IO ()

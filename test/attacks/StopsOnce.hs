@@ -38,7 +38,8 @@ attack =
           masking = case k `mod` 4 of
             0 -> mask_
             _ -> id
-      t <- caller (void (try (masking (operator (Signal.watching (readTVar flag)) slow)) :: IO (Either SomeException ())) `finally` uninterruptibleMask_ (putMVar over ()))
+          act = try (masking (operator (Signal.watching (readTVar flag)) slow)) :: IO (Either SomeException ())
+      t <- caller (void act `finally` uninterruptibleMask_ (putMVar over ()))
       takeMVar entered
       forM_ [0 .. 2] $ \i -> forkIO (threadDelay ((k * 37 + i * 53) `mod` 200) >> throwTo t (Boom i))
       threadDelay (k * 29 `mod` 150) >> atomically (writeTVar flag False)

@@ -16,8 +16,7 @@ import qualified Behavior.Time as Time
 
 attack :: IO ()
 attack = do
-  seed <- newIORef (12345 :: Int)
-  let below n = atomicModifyIORef' seed (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', (s' `div` 65536) `mod` n))
+  below <- randomBelow 12345
   forM_ [1 .. 3000 :: Int] $ \k -> do
     inside <- newIORef (0 :: Int)
     faulted <- newIORef (0 :: Int)
@@ -58,16 +57,17 @@ attack = do
     waits <- mapM (\_ -> below 800) [1 .. 3 :: Int]
     inner <- below 900
     finished <- newIORef (0 :: Int)
-    end <- endsWithin 20000 ("storm " ++ show k) (\t ->
-      forM_ (zip [1 ..] waits) $ \(i, w) -> forkIO (threadDelay w >> throwTo t (if even (k + i) then toException (Boom (-i)) else toException ThreadKilled))) $ do
-        r <- try (timeout inner behavior) :: IO (Either SomeException (Maybe ()))
-        uninterruptibleMask_ $ do
-          n <- readIORef inside
-          when (n /= 0) (void (broken ("storm " ++ show k ++ ": " ++ show n ++ " behaviours still run")))
-          f <- readIORef faulted
-          -- (A second fault may be hidden by the first.)
-          when (f > 0 && not (faultIn k r)) (void (broken ("storm " ++ show k ++ ": a fault was lost: " ++ show r)))
-        writeIORef finished 1
+    let exception i = if even (k + i) then toException (Boom (-i)) else toException ThreadKilled
+        throwing t = forM_ (zip [1 ..] waits) $ \(i, w) -> forkIO (threadDelay w >> throwTo t (exception i))
+    end <- endsWithin 20000 ("storm " ++ show k) throwing $ do
+      r <- try (timeout inner behavior) :: IO (Either SomeException (Maybe ()))
+      uninterruptibleMask_ $ do
+        n <- readIORef inside
+        when (n /= 0) (void (broken ("storm " ++ show k ++ ": " ++ show n ++ " behaviours still run")))
+        f <- readIORef faulted
+        -- (A second fault may be hidden by the first.)
+        when (f > 0 && not (faultIn k r)) (void (broken ("storm " ++ show k ++ ": a fault was lost: " ++ show r)))
+      writeIORef finished 1
     end `seq` pure ()
     left <- liveThreadCount
     promise ("storm " ++ show k ++ ": " ++ show left ++ " threads were left") (left == 0)

@@ -15,7 +15,9 @@ attack =
   forM_ [(outer, inner) | outer <- [60, 150], inner <- [60, 150], outer /= inner] $ \(outer, inner) -> do
     library <- run outer inner (\act -> parallel act act)
     ghc <- run outer inner id
-    promise ("outer " ++ show outer ++ ", inner " ++ show inner ++ ": " ++ library ++ ", and in GHC " ++ ghc) (library == ghc)
+    promise
+      ("outer " ++ show outer ++ ", inner " ++ show inner ++ ": " ++ library ++ ", and in GHC " ++ ghc)
+      (library == ghc)
 
 -- | The cleanup takes 300 ms: it kills a thread that is uninterruptible for so long.
 run :: Int -> Int -> (IO () -> IO ()) -> IO String

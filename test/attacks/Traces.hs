@@ -41,8 +41,7 @@ attack = bracket getUncaughtExceptionHandler setUncaughtExceptionHandler $ \_ ->
 -- with a question mark.
 storms :: IO ()
 storms = do
-  seed <- newIORef (4711 :: Int)
-  let below n = atomicModifyIORef' seed (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', (s' `div` 65536) `mod` n))
+  below <- randomBelow 4711
   forM_ [1 .. 1500 :: Int] $ \k -> do
     nested <- newIORef []
     let leaf p = do
@@ -78,7 +77,9 @@ storms = do
             9 -> Signal.withShared (not <$> sensor) (`Signal.whileHolding` parallel a b)
             10 -> mask_ (parallel a b)
             11 -> uninterruptibleMask_ (named (in' "masked") (pure ())) >> attempt 2 a
-            12 -> withInbox 3 (\deliver -> pure () <$ deliver ()) (\inbox -> onMessage inbox (\() -> a >> pure (pure ())) b)
+            12 ->
+              let finishing inbox = onMessage inbox (\() -> a >> pure (pure ())) b
+              in withInbox 3 (\deliver -> pure () <$ deliver ()) finishing
             13 -> withInbox 3 (\deliver -> pure () <$ deliver ()) (\inbox -> handleNext inbox (\() -> pure () <$ a)) ? b
             14 -> a `finally` Time.cleanupWithin 0.0003 b
             15 -> pinned (parallel a b)
@@ -95,15 +96,18 @@ storms = do
     detailed <- (== 0) <$> below 2
     events <- newIORef []
     let keep = EachEvent (\e -> atomicModifyIORef' events (\es -> (e : es, ())))
-    _ <- endsWithin 20000 ("storm " ++ show k) (\t ->
-      forM_ (zip [1 ..] waits) $ \(i, w) -> forkIO (threadDelay w >> throwTo t (if even (k + i) then toException (Boom (-i)) else toException ThreadKilled))) $
+    let exception i = if even (k + i) then toException (Boom (-i)) else toException ThreadKilled
+        throwing t = forM_ (zip [1 ..] waits) $ \(i, w) -> forkIO (threadDelay w >> throwTo t (exception i))
+    _ <- endsWithin 20000 ("storm " ++ show k) throwing $
         withTraceOptions defaultTraceOptions {withOperators = detailed} [keep] (timeout inner behavior)
     awaitNoThreads ("storm " ++ show k)
     whole <- reverse <$> readIORef events
     check ("storm " ++ show k) "" whole
     -- What a nested trace has received is a part of it. (One in an abandoned branch may outlive it.)
     parts <- reverse <$> readIORef nested
-    forM_ parts $ \(at, e) -> unless ("~" `isInfixOf` at) $ promise ("storm " ++ show k ++ ": of the nested trace alone: " ++ show e) (any (sameAs e) whole)
+    forM_ parts $ \(at, e) ->
+      unless ("~" `isInfixOf` at) $
+        promise ("storm " ++ show k ++ ": of the nested trace alone: " ++ show e) (any (sameAs e) whole)
  where
   sameAs (Ended s t end) = \case Ended s' t' end' -> (spanNumber s, t, end) == (spanNumber s', t', end'); _ -> False
   sameAs (Began s) = \case Began s' -> spanNumber s == spanNumber s'; _ -> False
@@ -114,7 +118,9 @@ insideThread :: IO () -> IO ()
 insideThread act = mask $ \restore -> do
   box <- newEmptyMVar
   thread <- forkIOWithUnmask (\unmask -> try (unmask act) >>= putMVar box)
-  end <- restore (readMVar box) `catch` \e -> uninterruptibleMask_ (forkIO (throwTo thread e) >> readMVar box >> throwIO (e :: SomeException))
+  end <-
+    restore (readMVar box) `catch` \e ->
+      uninterruptibleMask_ (forkIO (throwTo thread e) >> readMVar box >> throwIO (e :: SomeException))
   either (\e -> throwIO (e :: SomeException)) pure end
 
 awaitNoThreads :: String -> IO ()
@@ -164,7 +170,8 @@ check what root events = do
       left <- readIORef open
       known <- readIORef begun
       -- (What is abandoned may end by itself at the same time.)
-      forM_ (IntMap.keys left) $ \n -> when (fmap spanParent (IntMap.lookup n known) == Just (Inside (spanNumber s)) && not abandoned) $
+      forM_ (IntMap.keys left) $ \n ->
+        when (fmap spanParent (IntMap.lookup n known) == Just (Inside (spanNumber s)) && not abandoned) $
         wrong ("ended before " ++ show (IntMap.lookup n known)) e
     Lost _ -> wrong "lost" e
     Reacted _ -> pure ()
@@ -172,7 +179,8 @@ check what root events = do
   known <- readIORef begun
   -- (What was abandoned may still run when its trace has ended.)
   forM_ (IntMap.keys left) $ \n -> forM_ (IntMap.lookup n known) $ \s ->
-    unless ("~" `isInfixOf` spanName s || spanKind s /= Named || spanParent s == UnknownParent) $ wrong "it never ended" s
+    unless ("~" `isInfixOf` spanName s || spanKind s /= Named || spanParent s == UnknownParent) $
+      wrong "it never ended" s
 
 -- | Two traces at the same time: each gets its own spans, all of them.
 sideBySide :: IO ()
@@ -187,7 +195,10 @@ sideBySide = forM_ [1 .. 30 :: Int] $ \_ -> do
       withTrace [EachEvent (\e -> modifyIORef' events (e :))] . named side . replicateM_ 50 $
         both (named (side ++ "/a") yield) (parallel (named (side ++ "/b") yield) (named (side ++ "/c") yield))
       es <- reverse <$> readIORef events
-      let own e = case e of Began s -> side `isPrefixOf` spanName s; Ended s _ _ -> side `isPrefixOf` spanName s; _ -> False
+      let own = \case
+            Began s -> side `isPrefixOf` spanName s
+            Ended s _ _ -> side `isPrefixOf` spanName s
+            _ -> False
       forM_ es $ \e -> unless (own e) $ broken ("the trace " ++ side ++ " has " ++ show e)
       check side "" es
       putMVar box ()
@@ -229,14 +240,17 @@ sameResults :: IO ()
 sameResults = forM_ (zip [1 :: Int ..] programs) $ \(k, program) -> do
   without <- outcome k program
   forM_ [False, True] $ \detailed -> do
-    with <- outcome k (withTraceOptions defaultTraceOptions {withOperators = detailed} [EachEvent (\_ -> pure ())] program)
+    let options = defaultTraceOptions {withOperators = detailed}
+    with <- outcome k (withTraceOptions options [EachEvent (\_ -> pure ())] program)
     promise ("program " ++ show k ++ ": " ++ without ++ ", and in a trace " ++ with) (with == without)
  where
   outcome k program =
     inThread 5000 ("program " ++ show k) (try program >>= either shown pure) >>= either shown pure
   -- (An exception may itself be undefined.)
   shown :: SomeException -> IO String
-  shown e = try (evaluate (let text = kind e in length text `seq` text)) >>= either (fmap ("undefined: " ++) . shown) pure
+  shown e =
+    try (evaluate (let text = kind e in length text `seq` text))
+      >>= either (fmap ("undefined: " ++) . shown) pure
   kind e
     | Just (BehaviorFailed _ f) <- fromException e = "failure " ++ (f `seq` "")
     | Just (StoppedWithFault a b) <- fromException e = "stopped (" ++ kind a ++ ") with (" ++ kind b ++ ")"

@@ -34,15 +34,19 @@ import Behavior.Trace
 attack :: IO ()
 attack = do
   kinds <- truth 4711 1000
-  promise ("stopped by " ++ show kinds) (all (`Map.member` kinds) ["SiblingFinished", "SiblingFailed", "TimeLimit", "FromOutside", "SignalChanged", "WasAbandoned"])
+  promise
+    ("stopped by " ++ show kinds)
+    ( all
+        (`Map.member` kinds)
+        ["SiblingFinished", "SiblingFailed", "TimeLimit", "FromOutside", "SignalChanged", "WasAbandoned"]
+    )
 
 -- | That many random programs, from this seed. Gives by what spans were stopped, and how often.
 truth :: Int -> Int -> IO (Map.Map String Int)
 truth seed0 count = bracket getUncaughtExceptionHandler setUncaughtExceptionHandler $ \_ -> do
   -- (What 'Time.abandoning' reports is expected here.)
   setUncaughtExceptionHandler (\_ -> pure ())
-  seed <- newIORef seed0
-  let below n = atomicModifyIORef' seed (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', (s' `div` 65536) `mod` n))
+  below <- randomBelow seed0
   kinds <- newIORef Map.empty
   forM_ [1 .. count] $ \k -> do
     world <- World <$> newIORef [] <*> newIORef [] <*> newIORef [] <*> forM [0, 1 :: Int] (\_ -> newTVarIO 0)
@@ -60,7 +64,9 @@ truth seed0 count = bracket getUncaughtExceptionHandler setUncaughtExceptionHand
           t <- now
           add (outside world) (t, displayException e)
           throwTo thread e
-    changing <- forkIO (forM_ [1 ..] $ \n -> forM_ (zip [0 ..] (variables world)) (uncurry (change world n)) >> threadDelay pause)
+    changing <- forkIO . forM_ [1 ..] $ \n -> do
+      forM_ (zip [0 ..] (variables world)) (uncurry (change world n))
+      threadDelay pause
     _ <- endsWithin 20000 what (forM_ (zip [1 :: Int ..] waits) . throwing) $
       withTraceOptions defaultTraceOptions {withOperators = detailed} [keep] (timeout limit program)
     killThread changing
@@ -145,16 +151,22 @@ randomProgram below world = tree
       3 -> two (\a b -> firstOf [a, b]) "1" "2"
       4 -> two (\a b -> void (allOf [a, b])) "1" "2"
       5 -> two (\a b -> scoped (\nursery -> fork nursery a >> b)) "fork 1" "body"
-      6 -> two (\a b -> scoped (\nursery -> fork nursery a >>= \c -> Time.sleep 0.0003 >> requestStop c >> b)) "fork 1" "body"
+      6 ->
+        let body nursery a b = fork nursery a >>= \c -> Time.sleep 0.0003 >> requestStop c >> b
+        in two (\a b -> scoped (\nursery -> body nursery a b)) "fork 1" "body"
       7 -> two (Signal.monitor isOdd) "recovery" "task"
       8 -> two (Signal.rSelect isOdd) "left" "right"
       9 -> two (\a b -> Signal.switch ((`mod` 3) <$> signal) (\m -> if m == 0 then a else b)) "branch" "branch"
       10 -> two (\a b -> Signal.teleoReactive [(isOdd, a), (not <$> isOdd, b)]) "rule 1" "rule 2"
       11 -> (\a -> Signal.whileHolding (Signal.named "even" (even <$> signal)) a ? pure ()) <$> child "branch"
       12 -> two (Signal.insteadWhen (Signal.named "late" ((> 12) <$> signal))) "emergency" "branch"
-      13 -> two (\a b -> decide (\ends -> if length (filter isJust ends) == 2 then Just (pure ()) else Nothing) [a, b]) "1" "2"
+      13 ->
+        let whenBothEnd ends = if length (filter isJust ends) == 2 then Just (pure ()) else Nothing
+        in two (\a b -> decide whenBothEnd [a, b]) "1" "2"
       14 -> (\a -> Time.timeout limit a ? pure ()) <$> child "branch"
-      15 -> two (\a b -> withInbox 3 (\deliver -> forever (deliver () >> Time.sleep 0.0006)) (\inbox -> onMessage inbox (\() -> pure () <$ a) b)) "handler" "task"
+      15 ->
+        let delivers deliver = forever (deliver () >> Time.sleep 0.0006)
+        in two (\a b -> withInbox 3 delivers (\inbox -> onMessage inbox (\() -> pure () <$ a) b)) "handler" "task"
       16 -> two (\a b -> a `finally` Time.cleanupWithin limit (b ? pure ())) "first" "branch"
       17 -> Time.abandoning 0.0001 <$> child "~branch"
       18 -> two (\a b -> pinned (Signal.withShared isOdd (\shared -> Signal.monitor shared a b))) "recovery" "task"
@@ -184,8 +196,16 @@ compared world events = do
       reactions = Map.fromListWith (++) [(reactionNumber r, [r]) | Reacted r <- events]
       -- Runs of the same name come one after the other.
       runsOf = Map.map (sortOn runBegan) (Map.fromListWith (++) [(runName r, [r]) | r <- real])
-      spansOf = Map.map (sortOn spanNumber) (Map.fromListWith (++) [(spanName s, [s]) | Began s <- events, spanKind s == Named])
-      runOf = IntMap.fromList (concat [zip (map spanNumber ss) (Map.findWithDefault [] name runsOf) | (name, ss) <- Map.toList spansOf])
+      spansOf =
+        Map.map
+          (sortOn spanNumber)
+          (Map.fromListWith (++) [(spanName s, [s]) | Began s <- events, spanKind s == Named])
+      runOf =
+        IntMap.fromList
+          [ one
+          | (name, ss) <- Map.toList spansOf
+          , one <- zip (map spanNumber ss) (Map.findWithDefault [] name runsOf)
+          ]
       around s = case spanParent s of
         Inside n | Just o <- IntMap.lookup n begun -> o : around o
         _ -> []
@@ -195,8 +215,17 @@ compared world events = do
       wrong text what = [text ++ ": " ++ show what]
       spans = [w | Began s <- events, w <- ofSpan s]
       ofSpan s = concat
-        [ wrong "it has not one end" (s, found) | let found = IntMap.findWithDefault [] (spanNumber s) endOf', length found /= 1, not (null found && isLoose s) ]
-        ++ concat [wrong "it is not within its parent" (s, o) | not (isLoose s), o <- take 1 (around s), not (within s o)]
+        [ wrong "it has not one end" (s, found)
+        | let found = IntMap.findWithDefault [] (spanNumber s) endOf'
+        , length found /= 1
+        , not (null found && isLoose s)
+        ]
+        ++ concat
+          [ wrong "it is not within its parent" (s, o)
+          | not (isLoose s)
+          , o <- take 1 (around s)
+          , not (within s o)
+          ]
         ++ (if spanKind s == Named && not (isLoose s) then ofNamed s else [])
       within s o = spanBegan o <= spanBegan s && and [t <= t' | (t, _) <- theEnd s, (t', _) <- theEnd o]
       theEnd s = IntMap.findWithDefault [] (spanNumber s) endOf'
@@ -206,41 +235,90 @@ compared world events = do
           concat [wrong "its beginning" (s, r) | spanBegan s > runBegan r]
             ++ concat [wrong "its end" (s, t, r) | (t, _) <- theEnd s, t < runEnded r]
             ++ concat [wrong "how it ended" (s, end, r) | (_, end) <- theEnd s, not (agree end (runEnd r))]
-            ++ concat [wrong "its cause" (s, c, r, around s) | runEnd r == Cancelled, (_, StoppedBy c) <- theEnd s, not (true s r c)]
+            ++ concat
+              [ wrong "its cause" (s, c, r, around s)
+              | runEnd r == Cancelled
+              , (_, StoppedBy c) <- theEnd s
+              , not (true s r c)
+              ]
       agree end h = case end of
         Succeeded -> h == Returned
         FailedWith _ -> h == Failure
         FaultedWith _ -> h == Fault
         StoppedBy _ -> h == Cancelled
       -- The named spans of a branch of this operator, and how they really ended.
-      siblings o name = [r | s <- Map.findWithDefault [] (spanName o ++ "/" ++ name) spansOf, take 1 (filter ((== Named) . spanKind) (around s)) == [o], r <- maybeToList (IntMap.lookup (spanNumber s) runOf)]
+      siblings o name =
+        [ r
+        | s <- Map.findWithDefault [] (spanName o ++ "/" ++ name) spansOf
+        , take 1 (filter ((== Named) . spanKind) (around s)) == [o]
+        , r <- maybeToList (IntMap.lookup (spanNumber s) runOf)
+        ]
       namedAround = filter ((== Named) . spanKind) . around
       true s r = \case
-        SiblingFinished name -> or [runEnd b == Returned && runEnded b <= runEnded r | o <- namedAround s, part <- parts name, b <- siblings o part]
+        SiblingFinished name -> anySibling s r name [Returned]
         SiblingFailed "sensor" -> or [variable w < 2 && written w > 2 && before w <= runEnded r | w <- changes]
-        SiblingFailed name -> or [runEnd b `elem` [Failure, Fault] && runEnded b <= runEnded r | o <- namedAround s, part <- parts name, b <- siblings o part]
+        SiblingFailed name -> anySibling s r name [Failure, Fault]
         TimeLimit limit -> limit == 0.0007 && or [runEnded r >= spanBegan o + limit | o <- namedAround s]
         FromOutside "<<timeout>>" -> True
         FromOutside "requestStop" -> or ["/fork 1" `isInfixOf` spanName o | o <- s : namedAround s]
         FromOutside text -> or [t <= runEnded r && text' == text | (t, text') <- thrown]
         SignalChanged n cs -> case Map.lookup n reactions of
-          Just [x] -> reactionChanges x == cs && reactionTime x <= runEnded r && reactionParent x `elem` (map (Inside . spanNumber) (around s) ++ [Top])
+          Just [x] ->
+            reactionChanges x == cs
+              && reactionTime x <= runEnded r
+              && reactionParent x `elem` (map (Inside . spanNumber) (around s) ++ [Top])
           Just _ -> False
           Nothing -> True -- it may have been cancelled before it could tell
         WasAbandoned -> False
-      parts name = if ", " `isInfixOf` name then take 1 (words (filter (/= ',') name)) ++ drop 1 (words (filter (/= ',') name)) else [name]
+      anySibling s r name hows =
+        or
+          [ runEnd b `elem` hows && runEnded b <= runEnded r
+          | o <- namedAround s
+          , part <- parts name
+          , b <- siblings o part
+          ]
+      parts name = if ", " `isInfixOf` name then words (filter (/= ',') name) else [name]
       ofReactions = [w | Reacted r <- events, w <- ofReaction r]
       ofReaction r =
         concat [wrong "values that were not together" r | not (together (reactionChanges r))]
-          ++ concat [wrong "a value that its signal did not have" (r, c) | c <- reactionChanges r, Just i <- [stripPrefix "s" (changeSignal c) >>= readMaybe], Just x <- [readMaybe (changeAfter c)], not (had i x (maybe 0 spanBegan (parent r)) (reactionTime r))]
-          ++ concat [wrong "it started something else" (r, s) | Just name <- [reactionStarts r], Began s <- events, spanKind s == Named, spanReaction s == Just (reactionNumber r), not (("/" ++ name) `isSuffixOf` spanName s), not ("~" `isInfixOf` spanName s)]
+          ++ concat
+            [ wrong "a value that its signal did not have" (r, c)
+            | c <- reactionChanges r
+            , Just i <- [stripPrefix "s" (changeSignal c) >>= readMaybe]
+            , Just x <- [readMaybe (changeAfter c)]
+            , not (had i x (maybe 0 spanBegan (parent r)) (reactionTime r))
+            ]
+          ++ concat
+            [ wrong "it started something else" (r, s)
+            | Just name <- [reactionStarts r]
+            , Began s <- events
+            , spanKind s == Named
+            , spanReaction s == Just (reactionNumber r)
+            , not (("/" ++ name) `isSuffixOf` spanName s)
+            , not ("~" `isInfixOf` spanName s)
+            ]
       parent r = case reactionParent r of
         Inside n -> IntMap.lookup n begun
         _ -> Nothing
       -- It was written before the second time, and not overwritten before the first.
-      had i x from to = (x == 0 || or [before w <= to | w <- changes, variable w == i, written w == x]) && and [after w >= from | w <- changes, variable w == i, written w == x + 1]
-      together cs = and [odd x == (changeAfter o == "True") | (c, o) <- zip cs (drop 1 cs), changeSignal o == changeSignal c ++ " odd", Just x <- [readMaybe (changeAfter c) :: Maybe Int]]
-      lostRuns = [wrongRun | (name, rs) <- Map.toList runsOf, let known = length (Map.findWithDefault [] name spansOf), length rs > known, not ("~" `isInfixOf` name), wrongRun <- wrong "runs without a span" (name, length rs, known)]
+      had i x from to =
+        (x == 0 || or [before w <= to | w <- changes, variable w == i, written w == x])
+          && and [after w >= from | w <- changes, variable w == i, written w == x + 1]
+      together cs =
+        and
+          [ odd x == (changeAfter o == "True")
+          | (c, o) <- zip cs (drop 1 cs)
+          , changeSignal o == changeSignal c ++ " odd"
+          , Just x <- [readMaybe (changeAfter c) :: Maybe Int]
+          ]
+      lostRuns =
+        [ wrongRun
+        | (name, rs) <- Map.toList runsOf
+        , let known = length (Map.findWithDefault [] name spansOf)
+        , length rs > known
+        , not ("~" `isInfixOf` name)
+        , wrongRun <- wrong "runs without a span" (name, length rs, known)
+        ]
       doubled = [n | (n, _ : _ : _) <- Map.toList reactions]
       all' = spans ++ ofReactions ++ lostRuns ++ concat [wrong "reactions that came twice" doubled | not (null doubled)]
   pure (listToMaybe all')

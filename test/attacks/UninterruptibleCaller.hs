@@ -23,7 +23,8 @@ attack =
       _ <- forkIO (takeMVar entered >> milliseconds 5 >> atomically (writeTVar flag False))
       _ <- inThread 3000 (name ++ ", " ++ caller) $ do
         me <- myThreadId
-        (around :: IO () -> IO ()) (operator (Signal.watching (readTVar flag)) ((putMVar entered () >> milliseconds 3600000) `finally` throwTo me (Boom 1)))
+        let act = (putMVar entered () >> milliseconds 3600000) `finally` throwTo me (Boom 1)
+        (around :: IO () -> IO ()) (operator (Signal.watching (readTVar flag)) act)
         milliseconds 500
       n <- liveThreadCount
       promise (show n ++ " threads were left") (n == 0)

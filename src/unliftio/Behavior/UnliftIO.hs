@@ -22,7 +22,8 @@
 --
 -- >>> import Control.Monad.IO.Class (liftIO)
 -- >>> import Control.Monad.Trans.Reader (ReaderT (..), ask)
--- >>> let open = ask >>= \door -> liftIO (if door == "front" then failWith "locked" else putStrLn ("through the " ++ door)) :: ReaderT String IO ()
+-- >>> let enter door = if door == "front" then failWith "locked" else putStrLn ("through the " ++ door)
+-- >>> let open = ask >>= liftIO . enter :: ReaderT String IO ()
 -- >>> runReaderT (open ? liftIO (putStrLn "knock")) "front"
 -- knock
 module Behavior.UnliftIO

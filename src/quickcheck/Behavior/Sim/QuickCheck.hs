@@ -143,8 +143,10 @@ explained :: IORef (Maybe Sim.Counterexample) -> Rose Result -> IO (Rose Result)
 explained shown rose = do
   MkRose result smaller <- reduceRose rose
   happened <- fmap renderSchedule <$> readIORef shown
-  let with shownText = result {callbacks = printing shownText : callbacks result, testCase = shownText : testCase result}
-  pure (MkRose (if falsified result then maybe result with happened else result) (map (IORose . explained shown) smaller))
+  let with shownText =
+        result {callbacks = printing shownText : callbacks result, testCase = shownText : testCase result}
+      shrunk = map (IORose . explained shown) smaller
+  pure (MkRose (if falsified result then maybe result with happened else result) shrunk)
  where
   printing shownText = PostFinalFailure Counterexample (\state _ -> putLine (terminal state) shownText)
 

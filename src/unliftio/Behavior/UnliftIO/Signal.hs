@@ -111,7 +111,8 @@ insteadWhen condition emergency act = withRunInIO $ \run -> IO.insteadWhen condi
 --
 -- @since 0.1.0.0
 pausedWhile :: MonadUnliftIO m => Signal Bool -> m () -> m () -> m a -> m a
-pausedWhile condition pause resume act = withRunInIO $ \run -> IO.pausedWhile condition (run pause) (run resume) (run act)
+pausedWhile condition pause resume act =
+  withRunInIO $ \run -> IO.pausedWhile condition (run pause) (run resume) (run act)
 
 -- | 'Behavior.Signal.stoppedWhile'.
 --
