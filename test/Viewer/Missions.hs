@@ -7,6 +7,9 @@ module Viewer.Missions
   , doors
   , locked
   , buttoned
+  , emergency
+  , surveyed
+  , ruled
   , crowded
   , crowdedBy
   , robots
@@ -87,6 +90,39 @@ buttoned =
   cause = StoppedBy (SignalChanged 4 changes)
   stopped = StoppedBranch "branch" 4 0 cause
   changes = [Change "red button" (Just "False") "True"]
+
+-- | The red button ends a mission; then the motors are switched off.
+emergency :: [Event]
+emergency = map startingEmergency buttoned ++ ended 5 (Inside 1) "motors off" 6 (Just 4) 7 Succeeded
+ where
+  startingEmergency event = case event of
+    Reacted r -> Reacted r {reactionStarts = Just "emergency"}
+    _ -> event
+
+-- | The wind ends a survey, and then the drone flies home.
+surveyed :: [Event]
+surveyed =
+  ended 1 Top "mission" 0 Nothing 9 Succeeded
+    ++ ended 2 (Inside 1) "survey" 0 Nothing 6 Succeeded
+    ++ ended 3 (Inside 2) "film" 0 Nothing 6 (StoppedBy (SignalChanged 4 changes))
+    ++ [Reacted (Reaction 4 (Inside 2) "insteadWhen" 6 changes (Just (StoppedBranch "branch" 6 0 (StoppedBy (SignalChanged 4 changes)))) (Just "emergency"))]
+    ++ ended 5 (Inside 1) "fly home" 6 Nothing 9 Succeeded
+ where
+  changes = [Change "strong wind" (Just "False") "True"]
+
+-- | Ordered rules: a patrol is interrupted by a detection, of which a photograph is made. The rule takes that many
+-- seconds to stop, after it has waited.
+ruled :: Seconds -> [Event]
+ruled took =
+  ended 1 Top "mission" 0 Nothing 20 Succeeded
+    ++ ended 2 (Inside 1) "patrol" 0 Nothing 6 (StoppedBy (SignalChanged 3 seen))
+    ++ [Reacted (Reaction 3 (Inside 1) "teleoReactive" 6 seen (Just (StoppedBranch "rule 2" 6 0 (StoppedBy (SignalChanged 3 seen)))) (Just "rule 1"))]
+    ++ ended 4 (Inside 1) "photograph" 6 (Just 3) 9 Succeeded
+    ++ [Reacted (Reaction 5 (Inside 1) "teleoReactive" 12 gone (Just (StoppedBranch "rule 1" 6 took (StoppedBy (SignalChanged 5 gone)))) (Just "rule 2"))]
+    ++ ended 6 (Inside 1) "patrol" (12 + took) (Just 5) 20 Succeeded
+ where
+  seen = [Change "detections" (Just "0") "1"]
+  gone = [Change "detections" (Just "1") "0"]
 
 -- | Five interruptions within two seconds, in a minute.
 crowded :: [Event]

@@ -2,7 +2,7 @@
 module Viewer.PictureSpec (spec) where
 
 import Data.Char (isDigit)
-import Data.List (isInfixOf, isPrefixOf, stripPrefix, tails)
+import Data.List (isInfixOf, isPrefixOf, sort, stripPrefix, tails)
 import qualified Data.Text.Lazy as Lazy
 import Test.Hspec
 import Test.QuickCheck
@@ -20,8 +20,8 @@ spec :: Spec
 spec = do
   describe "says how it ended" $ do
     it "with its time, interruptions, and what did not succeed" $ do
-      title watering `shouldBe` "mission succeeded after 37.5 s:interrupted once"
-      title mission `shouldBe` "mission not ended after 40 s:interrupted once, 1 of its 10 parts failed, 1 faulted, 2 not ended2 events were lost"
+      title watering `shouldBe` "mission succeeded after 37.5 s:interrupted once, 2.5 s of work redone"
+      title mission `shouldBe` "mission not ended after 40 s:interrupted once, 1 of 10 parts failed, 1 faulted, 2 not ended, 2.4 s of work redone2 events were lost"
       title (ended 1 Top "drive" 2 Nothing 4 (FailedWith "stuck")) `shouldBe` "drive failed after 2 s"
       title (ended 1 Top "drive" 2 Nothing 4 (StoppedBy (TimeLimit 2))) `shouldBe` "drive was stopped after 2 s"
     it "by a signal that ended it" $ do
@@ -29,10 +29,31 @@ spec = do
       -- Not if something began after that, or went on.
       title (buttoned ++ ended 9 (Inside 1) "motors off" 6.5 Nothing 7 Succeeded) `shouldBe` "mission succeeded after 7 s:interrupted once"
       title (buttoned ++ ended 9 (Inside 1) "film" 2 Nothing 6.8 Succeeded) `shouldBe` "mission succeeded after 7 s:interrupted once"
+    it "by a signal and what ran because of that" $ do
+      title emergency `shouldBe` "mission was ended by red button True → \"motors off\" after 7 s:interrupted once"
+      -- Not if the operator could go back, or if something else began after that.
+      title (map (byOperator "switch") emergency) `shouldBe` "mission succeeded after 7 s:interrupted once"
+      title (emergency ++ ended 9 (Inside 1) "report" 6.5 Nothing 7 Succeeded) `shouldBe` "mission succeeded after 7 s:interrupted once"
+    it "at a part that a signal ended" $ do
+      title surveyed `shouldBe` "mission succeeded after 9 s:interrupted once"
+      [t | t <- texts (drawn surveyed), "ended by a signal" `isInfixOf` t] `shouldBe` ["ended by a signal", "survey6 s, ended by a signal"]
+      -- The mission too, if nothing follows.
+      title [e | e <- surveyed, notBed "fly home" e] `shouldBe` "mission was ended by strong wind True after 9 s:interrupted once"
+    it "without interruptions that ended a wait" $ do
+      title (ruled 0) `shouldBe` "mission succeeded after 20 s:interrupted once, 6 s of work redone"
+      [attribute "class" e | e <- allOf "path" (drawn (ruled 0)), attribute "class" e `elem` ["i", "io"], not (null (textOf e))] `shouldBe` ["i", "io"]
+      texts (drawn (ruled 0)) `shouldSatisfy` elem "detections 0 (was 1)→ starts \"patrol\""
+      -- Not if that took time, or it is not known what ran there.
+      title (ruled 1) `shouldSatisfy` isInfixOf ":interrupted twice"
+      title [e | e <- ruled 0, notBed "photograph" e] `shouldSatisfy` isInfixOf ":interrupted twice"
+    it "with the time of what had to begin again" $ do
+      title wateredAgain `shouldBe` "mission succeeded after 30 s:10 s of work redone"
+      title [e | e <- wateredAgain, notBed "bed 1" e || not (isLater e)] `shouldBe` "mission succeeded after 30 s:5 s of work redone"
+      title (beside 5 ++ ended 4 (Inside 1) "listen" 6 Nothing 9 Succeeded) `shouldBe` "mission succeeded after 10 s"
     it "of several spans that are in no other" $
-      title (failing 3) `shouldBe` "2.9 s in all:3 of 3 parts failed"
+      title (failing 3) `shouldBe` "2.9 s in all:3 of 3 parts failed, 1.8 s of work redone"
     it "where changes interrupted nothing" $
-      title [e | e <- watering, not (isInterruption e)] `shouldBe` "mission succeeded after 37.5 s"
+      title [e | e <- watering, not (isInterruption e)] `shouldBe` "mission succeeded after 37.5 s:2.5 s of work redone"
 
   describe "says where most of the time went" $ do
     it "at the level where it is divided" $
@@ -82,7 +103,7 @@ spec = do
       [(attribute "class" e, take 10 (textOf e)) | e <- allOf "path" (drawn watering), attribute "class" e `elem` ["i", "io"], not (null (textOf e))]
         `shouldBe` [("i", "battery 18"), ("io", "battery 10")]
     it "and says what starts, if need be without the values before" $
-      texts (drawn watering) `shouldSatisfy` elem "battery 100 → batteryLow False→ starts \"water\""
+      texts (drawn watering) `shouldSatisfy` elem "battery 100 (was 18) → batteryLow False→ starts \"water\""
 
   describe "shows texts whole, if there is room" $ do
     it "a failure on two lines" $
@@ -104,6 +125,18 @@ spec = do
     it "leaves out what did not change" $
       texts (drawn (map (withChange (Change "outside" (Just "False") "False")) watering))
         `shouldSatisfy` \known -> any ("battery 18" `isPrefixOf`) known && not (any ("outside" `isInfixOf`) known)
+    it "says equally much of each, and says it on the right of its mark if there is room" $ do
+      let said events = [(textOf t, attribute "class" t) | g <- allOf "g" (drawn events), attribute "class" g == "il", t <- allOf "text" g]
+          saidAfter apart = length [t | (t, _) <- said (crowdedBy 2 apart), " after " `isInfixOf` t]
+      map saidAfter [4, 7] `shouldBe` [2, 0]
+      map snd (said (crowdedBy 1 0)) `shouldBe` [""]
+      map snd (said [e | e <- crowdedBy 1 29]) `shouldBe` ["e"]
+    it "has no tangle of arrows at ten within two seconds" $ do
+      let arrows = [d | e <- allOf "path" (drawn (crowdedBy 10 0.2)), attribute "class" e == "ar", let d = attribute "d" e]
+          ranges = [(minimum xs, maximum xs) | d <- arrows, 'V' `elem` d, 'H' `notElem` d, let (xs, _) = outline d]
+      length ranges `shouldBe` 10
+      [(b, a') | ((_, b), (a', _)) <- zip (sort ranges) (drop 1 (sort ranges)), a' <= b] `shouldBe` []
+      [d | d <- arrows, 'H' `elem` d, 'v' `elem` d] `shouldBe` []
     it "has no arrow over a bar" $ [n | n <- [1 .. 9], not (null (crossed (drawn (robots n))))] `shouldBe` []
 
   describe "shows what runs nowhere" $ do

@@ -21,6 +21,7 @@ import Behavior.Trace.Describe hiding (outcome)
 import Behavior.Trace.Recording
 import Behavior.Trace.Siblings
 import Behavior.Trace.Svg.Draw
+import Behavior.Trace.Svg.EndsOfWaits
 import Behavior.Trace.Svg.Header
 import Behavior.Trace.Svg.Interruptions
 import Behavior.Trace.Svg.Labels
@@ -57,7 +58,7 @@ timeline recorded =
     , interruptionLabels interruptions
     ]
  where
-  r = withSiblings recorded
+  r = endsOfWaits (withSiblings recorded)
   placed = place (\n -> (x (spanBegan (nodeSpan n)), x (nodeUntil r n))) (roots r)
   outcomeOf = outcomes r
   drawn = marks outcomeOf 800 placed
@@ -125,7 +126,7 @@ bar limit y h r stopRequests m
   | otherwise = group "" (path (Text.unwords ["b", class']) (barShape outcome (markLeft m) top w h) about : stopping)
  where
   outcome = markOutcome m
-  class' = if isMerged m && outcome `elem` [Success, RanAgain] && w >= 3 then "v2 " <> outcomeClass outcome else outcomeClass outcome
+  class' = if isMerged m && outcome `elem` [Success, RanAgain, CutShort] && w >= 3 then "v2 " <> outcomeClass outcome else outcomeClass outcome
   top = y (markLane m)
   w = markRight m - markLeft m
   about = titled $ if isMerged m then severalSpans m else aboutSpan limit r (markNode m)
@@ -147,6 +148,7 @@ severalSpans m = [some (markCount m) "span" ++ how, list (map (inertUpTo 60 . na
   how = case markOutcome m of
     Success -> ""
     RanAgain -> ""
+    CutShort -> ""
     Failure -> " failed"
     Fault -> " faulted"
     Stop -> " stopped"

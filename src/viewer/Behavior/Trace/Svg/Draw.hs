@@ -108,20 +108,22 @@ outcomeClass :: Outcome -> Text
 outcomeClass o = case o of
   Success -> "s"
   RanAgain -> "a"
+  CutShort -> "s"
   Failure -> "f"
   Fault -> "x"
   Stop -> "p"
   Running -> "r"
 
 -- | The outline of a bar. The right end is round if it succeeded, notched if it failed, jagged if
--- it faulted, cut off if it was stopped, and open if it was still running.
+-- it faulted, cut off if it was stopped or a signal ended it, and open if it was still running.
 barShape :: Outcome -> Double -> Double -> Double -> Double -> Text
 barShape outcome x y w h = Text.concat $ case outcome of
   RanAgain -> rounded
   Success -> rounded
   Failure -> corner ++ line (-n) (h / 2) ++ line n (h / 2) ++ back
   Fault -> corner ++ concat (replicate 2 (line (-n) (h / 4) ++ line n (h / 4))) ++ back
-  Stop -> corner ++ line (-n) h ++ back
+  Stop -> cutOff
+  CutShort -> cutOff
   Running -> ["M", px (x + w), " ", px y, "H", px x, "V", px (y + h), "H", px (x + w)]
  where
   rounded =
@@ -129,6 +131,7 @@ barShape outcome x y w h = Text.concat $ case outcome of
       ++ ["V", px (y + h - r), "q0 ", px r, " ", px (-r), " ", px r]
       ++ ["H", px (x + r), "q", px (-r), " 0 ", px (-r), " ", px (-r)]
       ++ ["V", px (y + r), "q0 ", px (-r), " ", px r, " ", px (-r), "Z"]
+  cutOff = corner ++ line (-n) h ++ back
   r = min 3 (w / 2)
   n = min 8 (w / 2)
   corner = ["M", px x, " ", px y, "H", px (x + w)]

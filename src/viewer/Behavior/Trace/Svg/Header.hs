@@ -5,14 +5,11 @@
 module Behavior.Trace.Svg.Header
   ( title
   , titleText
-  , endedBy
   ) where
 
 import qualified Data.IntMap.Strict as IntMap
-import qualified Data.IntSet as IntSet
-import Data.List (intercalate, sortOn)
-import Data.Maybe (isJust, listToMaybe)
-import Data.Ord (Down (..))
+import Data.List (intercalate)
+import Data.Maybe (isJust, maybeToList)
 import Prelude hiding (until)
 
 import Behavior.Trace
@@ -36,41 +33,30 @@ titleText outcomeOf r = unwords (filter (not . null) [lead, remarks])
  where
   (lead, remarks) = heading outcomeOf r
 
--- How the outermost span ended; and how often something was interrupted, what did not succeed, and what did in vain.
+-- How the outermost span ended; and how often something was interrupted, what did not succeed, and how much time was spent
+-- on what had to begin again.
 heading :: (Node -> Outcome) -> Recording -> (String, String)
 heading outcomeOf r = (if null remarks then lead else lead ++ ":", intercalate ", " remarks)
  where
   (lead, parts) = case outermost r of
     Just n -> (unwords [nameUpTo 60 n, ending n, "after", secondsText (nodeUntil r n - spanBegan (nodeSpan n))], filter (not . same n) (nodes r))
     Nothing -> (secondsText (until r - from r) ++ " in all", nodes r)
-  remarks = ["interrupted " ++ times interruptions | interruptions > 0] ++ zipWith (\(n, how) these -> show n ++ these ++ how) counted (ofParts : repeat " ")
-  ofParts = (if isJust (outermost r) then " of its " else " of ") ++ some (length parts) "part" ++ " "
+  remarks = ["interrupted " ++ times interruptions | interruptions > 0] ++ zipWith (\(n, how) these -> show n ++ these ++ how) counted (ofParts : repeat " ") ++ [secondsText again ++ " of work redone" | again > 0]
+  ofParts = " of " ++ some (length parts) "part" ++ " "
   interruptions = length (filter (isJust . reactionStopped) (reactions r))
-  counted = [(n, how) | (o, how) <- [(Failure, "failed"), (Fault, "faulted"), (Running, "not ended"), (RanAgain, "succeeded but ran again")], let n = count o, n > 0]
+  counted = [(n, how) | (o, how) <- [(Failure, "failed"), (Fault, "faulted"), (Running, "not ended")], let n = count o, n > 0]
   count o = length (filter ((o ==) . outcomeOf) parts)
   ending n
-    | Just by <- endedBy r = "was ended by " ++ by
+    | Just x <- IntMap.lookup (spanNumber (nodeSpan n)) (endedBySignals r) = "was ended by " ++ endedBy x
     | otherwise = (if outcomeOf n == Stop then "was " else "") ++ outcomeName (snd <$> nodeEnd n)
+  -- The last value, and what ran in the place of what was interrupted.
+  endedBy x =
+    intercalate " → " $
+      inertUpTo 60 (changesText [c {changeBefore = Nothing} | c <- lastOf (changedOnly (reactionChanges x))])
+        : [quoted (inertUpTo 40 (spanName s)) | (_, s : _) <- maybeToList (IntMap.lookup (reactionNumber x) (reactionSpans r))]
+  again = redone outcomeOf r
+  lastOf = take 1 . reverse
   same a b = spanNumber (nodeSpan a) == spanNumber (nodeSpan b)
-
--- | The change of a signal that ended the outermost span, if that succeeded: it interrupted what ran in it, and after
--- that nothing began, and nothing else ended.
-endedBy :: Recording -> Maybe String
-endedBy r = case (outermost r, sortOn (Down . reactionTime) (filter (isJust . reactionStopped) (reactions r))) of
-  (Just n, x : _)
-    | Just (_, Succeeded) <- nodeEnd n
-    , all (isOver x (around (reactionParent x))) [c | c <- nodes r, nodeSpan c /= nodeSpan n] ->
-        listToMaybe [inertUpTo 60 (changesText [c {changeBefore = Nothing}]) | c <- reverse (changedOnly (reactionChanges x))]
-  _ -> Nothing
- where
-  isOver x outer c = case nodeEnd c of
-    Just (_, StoppedBy (SignalChanged k _)) | k == reactionNumber x -> True
-    Just (t, _) -> t <= reactionTime x || spanBegan (nodeSpan c) <= reactionTime x && IntSet.member (spanNumber (nodeSpan c)) outer
-    Nothing -> False
-  -- What the operator ran in.
-  around (Inside k) | Just parent <- IntMap.lookup k parents = IntSet.insert k (around parent)
-  around _ = IntSet.empty
-  parents = IntMap.fromList [(spanNumber s, p) | s <- map nodeSpan (nodes r), p <- [spanParent s], p < Inside (spanNumber s)]
 
 nameUpTo :: Int -> Node -> String
 nameUpTo limit = inertUpTo limit . nameText . spanName . nodeSpan

@@ -87,26 +87,31 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
   byNumber = IntMap.fromList [(spanNumber (nodeSpan (placedNode p)), p) | p <- placed]
 
   arrows (m, (row, _)) =
-    map (arrow . downTo) (distinct targets) ++ map (arrow . uncurry onward) (nubBy sameLanes (pairsOf m))
+    map downTo (distinct targets) ++ map (arrow . uncurry onward) (nubBy sameLanes (pairsOf m))
    where
     targets = take 12 (concatMap (targetsOf (markerX m)) (markerReactions m))
     sameLanes (a, b) (a', b') = placedLane a == placedLane a' && placedLane b == placedLane b'
-    downTo (tip, lane, further) = downArrow gap (markerX m, rowY m row + 6) (tip, y lane + further)
-    distinct = nubBy (\(_, a, _) (_, b, _) -> a == b)
-  pairsOf m = [(from, to) | r <- markerReactions m, from : _ <- [find' stopped r], to : _ <- [find' started r]]
+    downTo (tip, lane, further, w) =
+      (if w < 8 then shape "ar" else arrow) (downArrow gap (min 4 (w / 3)) (markerX m, rowY m row + 6) (tip, y lane + further))
+    distinct = nubBy (\(_, a, _, _) (_, b, _, _) -> a == b)
+  -- (Between slivers in one lane such arrows would be a tangle: each of these bars ends where the next one begins.)
+  pairsOf m =
+    [(from, to) | r <- markerReactions m, from : _ <- [find' stopped r], to : _ <- [find' started r], isSeen from to]
+  isSeen from to = placedLane from /= placedLane to || not (any isSliver [from, to])
+  isSliver p = widthOf p < 8
   -- What was stopped; else what was started; else where nothing has a name in what the operator ran in; else that. The
-  -- pixel at which the arrow ends is not where two bars meet.
+  -- pixel at which the arrow ends is not where two bars meet. With the width of what is there.
   targetsOf at r = case (find' stopped r, find' started r) of
     ([], []) -> case reactionParent r of
       Inside n | Just p <- IntMap.lookup n byNumber ->
-        if any (isPause (placedLane p + 1) at) pauses then [(at, placedLane p + 1, barHeight / 2 - 2)] else [(at, placedLane p, 0)]
+        if any (isPause (placedLane p + 1) at) pauses then [(at, placedLane p + 1, barHeight / 2 - 2, 10)] else [(at, placedLane p, 0, 10)]
       _ -> []
-    ([], p : _) -> [(max at (afterBegin 8 p), placedLane p, 0)]
-    (ps, _) -> [(min at (beforeEnd 8 p), placedLane p, 0) | p <- ps]
+    ([], p : _) -> [(max at (afterBegin 8 p), placedLane p, 0, widthOf p)]
+    (ps, _) -> [(min at (beforeEnd 8 p), placedLane p, 0, widthOf p) | p <- ps]
   isPause lane at (lane', (a, b)) = lane == lane' && at >= a - 1 && at <= b + 1
   laneOf r = case targetsOf (x (reactionTime r)) r of
     [] -> 0
-    targets -> minimum [lane | (_, lane, _) <- targets]
+    targets -> minimum [lane | (_, lane, _, _) <- targets]
   onward from to
     | placedLane from == placedLane to = bracket (min 9 (gap - 3)) (ends from to) (y (placedLane from) + barHeight)
     | otherwise = onwardCurve (fst (ends from to), y (placedLane from) + barHeight) (placedLeft to, y (placedLane to) + barHeight / 2)
@@ -118,7 +123,10 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
 
   label (m, (row, known)) =
     path (effectClass (effectOf m)) (diamond (markerX m) (rowY m row)) (titled about)
-      : maybe [] (\(at, _, parts) -> [textAt "" at (rowY m row + 4) parts]) known
+      : [ textAt side at (rowY m row + 4) parts
+        | Just (begin, w, parts) <- [known]
+        , let (side, at) = if begin < markerX m then ("e", begin + w) else ("", begin)
+        ]
    where
     about = case markerReactions m of
       [r] -> [described r]
@@ -156,32 +164,32 @@ diamond x y = Text.concat ["M", px (x - 6), " ", px y, "l6 -6 6 6-6 6Z"]
 arrowOver :: Text -> Element
 arrowOver d = group "" [shape "ha" d, shape "ar" d]
 
--- Straight down, and aside only at its end.
-downArrow :: Double -> (Double, Double) -> (Double, Double) -> Text
-downArrow gap (x, from) (tip, to)
-  | abs (tip - x) < 0.5 = Text.concat ["M", px x, " ", px from, "V", px to, headTowards 0 1]
-  | otherwise = Text.concat ["M", px x, " ", px from, "V", px (to - bend), "L", px tip, " ", px to, headTowards (tip - x) bend]
+-- Straight down, and aside only at its end. Its head is that wide on each side.
+downArrow :: Double -> Double -> (Double, Double) -> (Double, Double) -> Text
+downArrow gap side (x, from) (tip, to)
+  | abs (tip - x) < 0.5 = Text.concat ["M", px x, " ", px from, "V", px to, headTowards side 0 1]
+  | otherwise = Text.concat ["M", px x, " ", px from, "V", px (to - bend), "L", px tip, " ", px to, headTowards side (tip - x) bend]
  where
   bend = min 10 (gap - 1)
 
 -- The head of an arrow that goes there.
-headTowards :: Double -> Double -> Text
-headTowards dx dy = "m" <> pair (bx - sx) (by - sy) <> "l" <> pair (sx - bx) (sy - by) <> " " <> pair (bx + sx) (by + sy)
+headTowards :: Double -> Double -> Double -> Text
+headTowards side dx dy = "m" <> pair (bx - sx) (by - sy) <> "l" <> pair (sx - bx) (sy - by) <> " " <> pair (bx + sx) (by + sy)
  where
   pair a b = px a <> " " <> px b
   far = sqrt (dx * dx + dy * dy)
   (bx, by) = (-6 * dx / far, -6 * dy / far)
-  (sx, sy) = (4 * dy / far, -4 * dx / far)
+  (sx, sy) = (side * dy / far, -side * dx / far)
 
 -- From the lower edge of what was stopped to the lower edge of what was started, around where they meet.
 bracket :: Double -> (Double, Double) -> Double -> Text
 bracket depth (a, b) bottom =
-  Text.concat ["M", px a, " ", px bottom, "v", px depth, "H", px b, "V", px bottom, headTowards 0 (-1)]
+  Text.concat ["M", px a, " ", px bottom, "v", px depth, "H", px b, "V", px bottom, headTowards 4 0 (-1)]
 
 -- From the lower edge of what was stopped to the left edge of what was started, in another lane.
 onwardCurve :: (Double, Double) -> (Double, Double) -> Text
 onwardCurve (a, bottom) (left, middle) =
-  Text.concat ["M", px a, " ", px bottom, "C", px a, " ", px middle, " ", px (left - 12), " ", px middle, " ", px left, " ", px middle, headTowards 1 0]
+  Text.concat ["M", px a, " ", px bottom, "C", px a, " ", px middle, " ", px (left - 12), " ", px middle, " ", px left, " ", px middle, headTowards 4 1 0]
 
 -- Where an arrow from what was stopped to what was started begins and ends: never so near to each other that
 -- it cannot be seen.
@@ -193,12 +201,15 @@ ends from to
   a = beforeEnd 18 from
   b = afterBegin 18 to
 
+widthOf :: Placed -> Double
+widthOf p = placedRight p - placedLeft p
+
 -- That many pixels before its end, after its begin; but in its last third, in its first third.
 beforeEnd, afterBegin :: Double -> Placed -> Double
-beforeEnd d p = placedRight p - min d ((placedRight p - placedLeft p) / 3)
-afterBegin d p = placedLeft p + min d ((placedRight p - placedLeft p) / 3)
+beforeEnd d p = placedRight p - min d (widthOf p / 3)
+afterBegin d p = placedLeft p + min d (widthOf p / 3)
 
 -- | What an arrow looks like, for the legend.
 arrowSample :: Effect -> Double -> Double -> Element
 arrowSample e x y =
-  group "" [shape (effectClass e) (diamond (x + 5) y), shape "ar" (Text.concat ["M", px (x + 11), " ", px y, "H", px (x + 27), headTowards 1 0])]
+  group "" [shape (effectClass e) (diamond (x + 5) y), shape "ar" (Text.concat ["M", px (x + 11), " ", px y, "H", px (x + 27), headTowards 4 1 0])]

@@ -51,12 +51,14 @@ labels notes right h taken = go (-1) 0 0
 
   -- From the bar on to the right; or if there is no room, with its name, ending there.
   below noted m later unnamed
-    | isNoted m || all (isAt m) placed = (placed, noted')
+    | isNoted m || all isClear placed = (placed, noted')
     | otherwise = ([], noted)
    where
     (placed, noted') = belowAt noted m later unnamed
-    -- A name that is not at its bar could be of another one.
-    isAt bar l = labelFrom l < markRight bar && labelTo l > markLeft bar
+    -- A name that is not at its bar could be of another one; also one of a sliver, or one that reaches below a bar that
+    -- is too short for its own.
+    isClear l =
+      labelFrom l < markRight m && labelTo l > markLeft m && insideOf m > -8 && and [insideOf o >= 8 | o <- takeWhile ((< labelTo l) . markLeft) later]
   belowAt noted m later unnamed = case (notedLines (room left) (text unnamed), notedLines (room furthest) (text True)) of
     ([], []) -> ([], noted)
     ([], texts) -> noteAt (end - width texts) texts
@@ -188,13 +190,17 @@ detailOf :: Mark -> Maybe String
 detailOf m
   | isMerged m = Nothing
   | otherwise = case nodeEnd (markNode m) of
-      Just (t, Succeeded) -> Just (took t ++ (if markOutcome m == RanAgain then ", ran again" else ""))
+      Just (t, Succeeded) -> Just (took t ++ remark)
       Just (t, StoppedBy (SignalChanged _ _)) -> Just ("stopped after " ++ took t)
       Just (_, how@(StoppedBy _)) -> Just (inertUpTo 200 (howText how))
       Just _ -> whyOf m
       Nothing -> Just "not ended"
  where
   took t = secondsText (t - spanBegan (nodeSpan (markNode m)))
+  remark = case markOutcome m of
+    RanAgain -> ", ran again"
+    CutShort -> ", ended by a signal"
+    _ -> ""
 
 whyOf :: Mark -> Maybe String
 whyOf m = case nodeEnd (markNode m) of

@@ -41,7 +41,7 @@ legend left right used = (group "le" (concat drawn), maximum (0 : downs))
   entries =
     concatMap
       (map snd . filter fst)
-      [ map outcome [(Success, "succeeded"), (RanAgain, "succeeded, but ran again"), (Failure, "failed"), (Fault, "faulted"), (Stop, "stopped")]
+      [ map outcome [(Success, "succeeded"), (RanAgain, "succeeded, but ran again"), (CutShort, "ended by a signal"), (Failure, "failed"), (Fault, "faulted"), (Stop, "stopped")]
       , [(usedStopping used, (\x y -> shape "h" (barShape Stop x y 26 13), "while stopping"))]
       , [outcome (Running, "not ended")]
       , [(usedPauses used, (\x y -> shape "wt" (Text.concat ["M", px (x + 2), " ", px (y + 6.5), "H", px (x + 25)]), "waiting, or unnamed"))]

@@ -3,9 +3,14 @@
 module Behavior.Trace.Svg.Outcome
   ( Outcome (..)
   , outcomes
+  , endedBySignals
+  , redone
   ) where
 
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
 import qualified Data.IntSet as IntSet
+import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 
 import Behavior.Time (Seconds)
@@ -17,6 +22,8 @@ data Outcome
   = Success
   | -- | It succeeded, but what it ran in did not; and after that, something of its name ran once more.
     RanAgain
+  | -- | It succeeded, because a signal ended it: see 'endedBySignals'.
+    CutShort
   | Stop
   | Running
   | Failure
@@ -28,9 +35,11 @@ outcomes :: Recording -> Node -> Outcome
 outcomes r = outcome
  where
   again = ranAgain r
+  ended = endedBySignals r
   outcome n = case snd <$> nodeEnd n of
     Nothing -> Running
     Just Succeeded | IntSet.member (spanNumber (nodeSpan n)) again -> RanAgain
+    Just Succeeded | IntMap.member (spanNumber (nodeSpan n)) ended -> CutShort
     Just Succeeded -> Success
     Just (FailedWith _) -> Failure
     Just (FaultedWith _) -> Fault
@@ -51,4 +60,60 @@ ranAgain r = IntSet.fromList (foldr (found Nothing) [] (roots r))
     Just (t, _) -> Just t
     Nothing -> Nothing
   earliest a b = maybe b (\t -> Just (maybe t (min t) b)) a
-  lastBegin = Map.fromListWith max [(spanName s, spanBegan s) | s <- map nodeSpan (nodes r)]
+  lastBegin = lastBegins r
+
+-- When the last span of each name began.
+lastBegins :: Recording -> Map String Seconds
+lastBegins r = Map.fromListWith max [(spanName s, spanBegan s) | s <- map nodeSpan (nodes r)]
+
+-- | The spans that succeeded because a signal changed, by their numbers, each with that reaction: it interrupted
+-- what ran in the span, and after that nothing ran there but the emergency of 'Behavior.Signal.insteadWhen', from
+-- which there is no way back.
+endedBySignals :: Recording -> IntMap Reaction
+endedBySignals r = foldr below IntMap.empty (roots r)
+ where
+  interrupted =
+    IntMap.fromListWith
+      latest
+      [(n, x) | x <- reactions r, Inside n <- [reactionParent x], Just b <- [reactionStopped x], stoppedEnd b /= Succeeded]
+  latest a b = if (reactionTime a, reactionNumber a) >= (reactionTime b, reactionNumber b) then a else b
+  number = spanNumber . nodeSpan
+  below n known = case (nodeEnd n, [x | Just x <- IntMap.lookup (number n) interrupted : map byNumber (nodeChildren n)]) of
+    (Just (_, Succeeded), found@(_ : _))
+      | x <- foldr1 latest found, all (isOver x) (nodeChildren n) -> IntMap.insert (number n) x inside
+    _ -> inside
+   where
+    inside = foldr below known (nodeChildren n)
+    byNumber c = IntMap.lookup (number c) inside
+    isOver x c = case nodeEnd c of
+      Just (_, StoppedBy (SignalChanged k _)) | k == reactionNumber x -> True
+      Just (t, _) ->
+        t <= reactionTime x || isEmergency x c || (reactionNumber <$> byNumber c) == Just (reactionNumber x)
+      Nothing -> False
+  isEmergency x c = reactionOperator x == "insteadWhen" && spanReaction (nodeSpan c) == Just (reactionNumber x)
+
+-- | How much time was spent on what had to begin again: on named spans without such spans in them that failed,
+-- faulted, were interrupted, or succeeded in vain, and of whose name one began after that. What lost against a part
+-- beside it is not among them.
+redone :: (Node -> Outcome) -> Recording -> Seconds
+redone outcomeOf r =
+  sum
+    [ t - spanBegan s
+    | n <- snd (foldr leaves (False, []) (roots r))
+    , let s = nodeSpan n
+    , Just (t, end) <- [nodeEnd n]
+    , isLost n end
+    , maybe False (>= t) (Map.lookup (spanName s) begins)
+    ]
+ where
+  begins = lastBegins r
+  -- Whether there is a name, and the innermost ones.
+  leaves n (there, rest) = (there || isNamed || inside, [n | isNamed, not inside] ++ rest')
+   where
+    isNamed = spanKind (nodeSpan n) == Named
+    (inside, rest') = foldr leaves (False, rest) (nodeChildren n)
+  isLost n end = case end of
+    Succeeded -> outcomeOf n == RanAgain
+    StoppedBy (SiblingFinished _) -> False
+    StoppedBy WasAbandoned -> False
+    _ -> True

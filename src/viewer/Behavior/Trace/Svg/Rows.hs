@@ -45,9 +45,9 @@ type Row = (Int, Maybe (Double, Double, [Part]))
 rowsFor :: Double -> Double -> Int -> Names -> [Marker] -> [Row]
 rowsFor left right most names markers = map final chosen
  where
-  -- The longest texts with which as many as possible have one.
+  -- The longest texts with which as many as possible have one; if possible, texts that say equally much.
   chosen = chosenFrom True (snd (head (sortOn fst [(without (chosenFrom False known), known) | known <- lengths])))
-  lengths = [texts, drop 1 . texts, shortest]
+  lengths = [\m -> if isAtEdge m then texts m else take 1 (drop k (texts m)) | k <- [0 .. 2]] ++ [texts, drop 1 . texts, shortest]
   shortest = take 1 . reverse . texts
   without = length . filter (isNothing . snd . snd)
   final (_, (_, Nothing)) = (1 + maximum (-1 : [row | (_, (row, Just _)) <- chosen]), Nothing)
@@ -57,7 +57,7 @@ rowsFor left right most names markers = map final chosen
    where
     choose done m = (m, fromMaybe (-1, Nothing) (listToMaybe (mapMaybe (fits False done m) options ++ mapMaybe (fits True done m) (if crossing then crossed else [])))) : done
      where
-      options = [(row, l) | l <- candidates (ofMarker m) m, row <- [0 .. most - 1]]
+      options = [(row, l) | l <- candidates (ofMarker m) m ++ (if crossing then cut (ofMarker m) m else []), row <- [0 .. most - 1]]
       crossed = [(row, l) | l <- candidates (shortest m) m, row <- [0 .. most - 1]]
   -- Better an arrow behind a label than no label.
   fits crossed done m (row, l@(at, w, _))
@@ -72,7 +72,9 @@ rowsFor left right most names markers = map final chosen
       | otherwise = covers at w (markerX other)
   covers at w x = x > at - 8 && x < at + w + 8
   candidates known m =
-    concat [[beside m parts | fitsRight m parts] ++ [before m parts | fitsLeft m parts] | parts <- known] ++ cut known m
+    concat [[beside m parts | fitsRight m parts] ++ [before m parts | isAtEdge m, fitsLeft m parts] | parts <- known]
+  -- A text is on the left of its marker only if there is no room on the right.
+  isAtEdge m = not (any (fitsRight m) (take 1 (drop 2 (texts m))))
   fitsRight m parts = markerX m + 12 + wide parts <= right
   fitsLeft m parts = markerX m - 12 - wide parts >= left
   beside m parts = (markerX m + 12, wide parts, parts)
@@ -94,7 +96,9 @@ rowsFor left right most names markers = map final chosen
     , (briefly r, inertUpTo 80 (arrows (startsText (snd (names r)) r)))
     ]
   interruptionsFirst = uncurry (++) . partition (isJust . reactionStopped)
-  values r = inertUpTo 120 (intercalate " → " (fst (partsOf r)))
+  values r = inertUpTo 120 (intercalate " → " (fst (partsOf r {reactionChanges = map withoutOpposite (changedOnly (reactionChanges r))})))
+  -- (What a condition was before follows from what it is.)
+  withoutOpposite c = if changeAfter c `elem` ["True", "False"] then c {changeBefore = Nothing} else c
   -- Without the values before.
   briefly r = values r {reactionChanges = [c {changeBefore = Nothing} | c <- changedOnly (reactionChanges r)]}
   partsOf r = uncurry reactionParts (names r) r
