@@ -5,19 +5,20 @@ module Main (main) where
 
 import Test.Hspec
 
-import qualified Behavior.TimerWheelSpec
 import qualified Behavior.AbandoningSpec
 import qualified Behavior.AgreeingSpec
 import qualified Behavior.BadReadingSpec
+import qualified Behavior.CancellationStressSpec
+import qualified Behavior.CleanupSpec
+import qualified Behavior.DecideSpec
+import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.FailureSpec
+import qualified Behavior.FilterSpec
 import qualified Behavior.FromOutsideSpec
 import qualified Behavior.InsteadWhenSpec
 import qualified Behavior.MessageRuleSpec
 import qualified Behavior.MessageSpec
 import qualified Behavior.MonitorSpec
-import qualified Behavior.CleanupSpec
-import qualified Behavior.DecideSpec
-import qualified Behavior.EqualitySuppressionSpec
 import qualified Behavior.OperatorsSpec
 import qualified Behavior.OutcomeSpec
 import qualified Behavior.ParallelSpec
@@ -29,7 +30,6 @@ import qualified Behavior.PromisesSpec
 import qualified Behavior.RateSpec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
-import qualified Behavior.FilterSpec
 import qualified Behavior.RepeatingSpec
 import qualified Behavior.ResumableSpec
 import qualified Behavior.RunBehaviorSpec
@@ -40,9 +40,9 @@ import qualified Behavior.ScopedSpec
 import qualified Behavior.SemaphoreSpec
 import qualified Behavior.SignalSpec
 import qualified Behavior.SpaceSpec
-import qualified Behavior.CancellationStressSpec
 import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
+import qualified Behavior.TimerWheelSpec
 import qualified Behavior.UnliftIOSpec
 import qualified Examples.DoorBatterySpec
 import qualified Examples.DroneSpec

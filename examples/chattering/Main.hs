@@ -8,10 +8,10 @@ import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
 import Behavior.Parallel (firstOf)
-import WorldChange
 import qualified Paper.Chattering as Chattering
 import Robot
 import World
+import WorldChange
 
 main :: IO ()
 main = runBehavior $ do

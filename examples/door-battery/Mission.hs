@@ -20,12 +20,12 @@ import Behavior.STM (readTVarIO)
 import Behavior.Sim (Outcome (..), Run (..), Schedule, defaultSimOptions, explain, simulateWith)
 import qualified Behavior.Sim as Sim
 import Behavior.Trace (Event, named)
-import WorldChange
 import Options
 import Programs (behavior)
 import Robot (inWorld)
 import Variation (variation)
 import World
+import WorldChange
 
 -- | The result of a mission.
 data Mission = Mission

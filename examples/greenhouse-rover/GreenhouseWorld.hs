@@ -8,8 +8,8 @@ module GreenhouseWorld
 
 import Beds
 import Behavior
-import Behavior.Sim.Mock
 import qualified Behavior.Signal as Signal
+import Behavior.Sim.Mock
 import GreenhouseRover
 
 -- | What changes at which times (in seconds), and what the devices do.

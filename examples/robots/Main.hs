@@ -9,9 +9,9 @@ import Options.Applicative
 import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
+import Behavior.Message (withInbox)
 import Behavior.STM
 import qualified Behavior.Signal as Signal
-import Behavior.Message (withInbox)
 import Behavior.Sim (Outcome (Returned), Run (..), defaultSimOptions, endAt, explain, simulateWith)
 import Behavior.Sim.Mock (begin, condition, driver, newMock, set, signal)
 import Behavior.Trace (named)

@@ -16,9 +16,9 @@ import Test.Hspec
 import Behavior (Failed)
 import Behavior.Internal.Runtime (atomically, now)
 import Behavior.Internal.Scope (Verdict (..), SomeBranch (..), requestStopAsync, outcome, structured)
-import Behavior.Internal.Trace.Event (Cause (..))
 import Behavior.Internal.Signal.Source (startSensors)
 import qualified Behavior.Internal.Signal.Source as Source
+import Behavior.Internal.Trace.Event (Cause (..))
 import qualified Behavior.Signal as Signal
 import Support
 import Watched

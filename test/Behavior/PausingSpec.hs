@@ -12,8 +12,8 @@ import Data.IORef
 import Test.Hspec
 
 import Behavior
-import Behavior.Sim (Plan, exhaustively, explain, explore, outcome, randomly, simulate)
 import Behavior.Signal (Signal, pausedWhile, stoppedWhile, teleoReactive)
+import Behavior.Sim (Plan, exhaustively, explain, explore, outcome, randomly, simulate)
 import Behavior.Time (atomically, checkpoint, now, sleepUntil, timeout)
 import Support
 import Watched

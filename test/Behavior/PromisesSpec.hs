@@ -8,8 +8,8 @@ import Control.Concurrent
 import Control.Concurrent.Async (asyncThreadId, cancel, race_, waitCatchSTM)
 import Control.Exception
 import Control.Monad (forM_, void)
-import qualified System.Timeout as System
 import System.Mem (performMajorGC)
+import qualified System.Timeout as System
 import Test.Hspec
 
 import Behavior

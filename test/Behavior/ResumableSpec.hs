@@ -16,8 +16,8 @@ import Test.Hspec.QuickCheck (prop)
 
 import Behavior
 import Behavior.Message (handleNext, unhandled, withInbox)
-import qualified Behavior.Signal as Signal
 import Behavior.STM
+import qualified Behavior.Signal as Signal
 import Behavior.Sim (Plan, exhaustively, explore, randomly)
 import Behavior.Time (checkpoint)
 import Memory (inConstantMemory)

@@ -11,8 +11,8 @@ import Test.Hspec
 
 import Behavior
 import Behavior.Parallel (allOf, await, fork, scoped)
-import qualified Behavior.Signal as Signal
 import Behavior.STM (atomically, check, modifyTVar', newTVarIO, readTVar, writeTVar)
+import qualified Behavior.Signal as Signal
 import Behavior.Trace (withTrace)
 import Memory (allocatedBy)
 import Support

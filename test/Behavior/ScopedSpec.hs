@@ -17,8 +17,8 @@ import Test.Hspec hiding (parallel)
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Parallel
-import Behavior.Sim (Outcome (Failing, Faulting, Returned), Run (outcome), explain, explore, randomly)
 import Behavior.STM (atomically, check, modifyTVar', newTVarIO, readTVar, writeTVar)
+import Behavior.Sim (Outcome (Failing, Faulting, Returned), Run (outcome), explain, explore, randomly)
 import Support
 
 spec :: Spec

@@ -13,8 +13,8 @@ import Test.Hspec hiding (parallel)
 import Behavior.UnliftIO
 import Behavior.UnliftIO.Message
 import Behavior.UnliftIO.Parallel
-import qualified Behavior.UnliftIO.Signal as Signal
 import Behavior.UnliftIO.STM
+import qualified Behavior.UnliftIO.Signal as Signal
 import Behavior.UnliftIO.Time
 import qualified Behavior.UnliftIO.Trace as Trace
 import Support (Fault (..), Log, guarded, newLog, note, notes)

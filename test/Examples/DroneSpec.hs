@@ -8,8 +8,8 @@ import Data.Foldable (for_)
 import Test.Hspec
 
 import Behavior
-import Behavior.Sim.Mock
 import qualified Behavior.Signal as Signal
+import Behavior.Sim.Mock
 import qualified Behavior.Time as Time
 import Drone
 import Examples.WorstDay

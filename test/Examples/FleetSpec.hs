@@ -13,8 +13,8 @@ import Behavior
 import Behavior.Message
 import qualified Behavior.Parallel as Parallel
 import Behavior.STM
-import Behavior.Sim.Mock
 import qualified Behavior.Signal as Signal
+import Behavior.Sim.Mock
 import Behavior.Time (checkpoint)
 import Examples.WorstDay
 import Fleet

@@ -9,9 +9,9 @@ import Test.Hspec
 
 import Behavior
 import Behavior.STM
+import qualified Behavior.Signal as Signal
 import Behavior.Sim (well)
 import Behavior.Sim.Mock
-import qualified Behavior.Signal as Signal
 import Behavior.Time (checkpoint, timeout)
 import Examples.WorstDay
 import Patrol

@@ -8,9 +8,9 @@ import Data.Foldable (for_)
 import Test.Hspec
 
 import Behavior
+import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
-import qualified Behavior.Signal as Signal
 import qualified Behavior.Time as Time
 import Examples.WorstDay
 import PickAndPlace

@@ -33,11 +33,11 @@ import Test.Hspec (shouldBe)
 import Behavior (Behavior, Failed (..), failWith)
 import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Time (atomically)
-import WorldChange (ChangeKind, WorldChange (action, changeKind))
-import qualified WorldChange
 import Robot (inWorld)
 import Support (Ending (..), ending, hang)
 import World
+import WorldChange (ChangeKind, WorldChange (action, changeKind))
+import qualified WorldChange
 
 -- | @playing setting script listing@: how the listing ended, and what the robot did. All
 -- scenes of the script must have been used.

@@ -19,8 +19,8 @@ module Semantics.Path
   ) where
 
 import Control.Monad (foldM)
-import qualified Data.Map.Strict as Map
 import Data.List (foldl')
+import qualified Data.Map.Strict as Map
 import Data.Maybe (mapMaybe)
 import Data.Set (Set)
 import qualified Data.Set as Set

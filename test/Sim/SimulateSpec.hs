@@ -13,8 +13,8 @@ import Control.Monad (forM_, forever, unless, void)
 import Data.IORef
 import Data.List (isInfixOf, nub)
 import GHC.Conc (unsafeIOToSTM)
-import qualified System.Timeout as System
 import System.Mem (performMajorGC)
+import qualified System.Timeout as System
 import Test.Hspec hiding (parallel)
 
 import Behavior

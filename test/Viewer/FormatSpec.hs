@@ -7,6 +7,7 @@ module Viewer.FormatSpec (spec) where
 import Data.Aeson
 import qualified Data.Aeson.Key as Key
 import qualified Data.Aeson.KeyMap as KeyMap
+import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (toList)
 import Data.Map.Strict (Map)
@@ -17,7 +18,6 @@ import qualified Data.Set as Set
 import Data.Text (Text)
 import qualified Data.Text as Text
 import qualified Data.Text.Encoding as Text
-import qualified Data.ByteString as Strict
 import Test.Hspec
 
 import Behavior.Trace

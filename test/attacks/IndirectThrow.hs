@@ -3,16 +3,16 @@
 module IndirectThrow (attack) where
 
 import Control.Concurrent
+import qualified Control.Concurrent.Async as Async
 import Control.Exception
 import Control.Monad (forM_, void)
 import Data.List (intercalate)
-import qualified Control.Concurrent.Async as Async
 
 import Attack
 import Behavior
 import Behavior.Parallel (allOf, scoped, fork)
-import Behavior.STM (atomically)
 import qualified Behavior.Parallel as P
+import Behavior.STM (atomically)
 
 attack :: IO ()
 attack = do

@@ -12,8 +12,8 @@ import Data.IORef
 import GHC.Clock (getMonotonicTime)
 
 import Attack
-import Behavior.Sim
 import Behavior.STM (atomically)
+import Behavior.Sim
 
 attack :: IO ()
 attack = do

@@ -11,9 +11,9 @@ import Data.List (nub, sort)
 import Attack
 import Behavior
 import Behavior.Parallel
+import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
-import Behavior.STM
 
 attack :: IO ()
 attack = forM_ programs $ \(name, program) -> do

@@ -21,8 +21,8 @@ import System.Posix.Process (exitImmediately)
 
 import Attack
 import Behavior
-import qualified Behavior.Signal as Signal
 import Behavior.STM (atomically, newTVarIO, readTVar, writeTVar)
+import qualified Behavior.Signal as Signal
 import Behavior.Trace
 
 attack :: IO ()

@@ -8,9 +8,9 @@ import Control.Concurrent
 import Control.Exception
 import Control.Monad (replicateM, replicateM_, void)
 import Data.List (intercalate)
-import System.CPUTime (getCPUTime)
 import GHC.Clock (getMonotonicTime)
 import GHC.Stats
+import System.CPUTime (getCPUTime)
 import System.Mem (performMajorGC)
 
 import Attack

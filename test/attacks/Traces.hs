@@ -10,8 +10,8 @@ import Control.Concurrent
 import Control.Exception
 import Control.Monad (forM_, replicateM_, unless, void, when)
 import Data.IORef
-import Data.List (isInfixOf, isPrefixOf)
 import qualified Data.IntMap.Strict as IntMap
+import Data.List (isInfixOf, isPrefixOf)
 import GHC.Conc (getUncaughtExceptionHandler, setUncaughtExceptionHandler)
 import GHC.Stats (gc, gcdetails_live_bytes, getRTSStats)
 import System.Mem (performMajorGC)

@@ -28,9 +28,9 @@ import qualified Data.Map.Strict as Map
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import GHC.IO (unsafeUnmask)
 
+import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.State
-import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Types
 
 -- | Throws to a task, now. The result: the pending exception, if the task cannot receive it

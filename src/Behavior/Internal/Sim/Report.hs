@@ -19,8 +19,8 @@ import Data.List (groupBy, intercalate, isInfixOf)
 import Numeric (showFFloat)
 
 import Behavior.Internal.Runtime.Backend (Label)
-import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.SafeText
+import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Types
 
 -- $setup

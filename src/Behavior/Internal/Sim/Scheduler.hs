@@ -32,10 +32,10 @@ import Data.Maybe (isJust)
 import Foreign.StablePtr (newStablePtr)
 
 import Behavior.Internal.Runtime.Backend
+import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.State
-import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
 

@@ -14,9 +14,9 @@ import Control.Concurrent
 import Control.Exception hiding (Deadlock)
 import Control.Monad (unless, when)
 import Data.Foldable (for_)
+import Data.Functor.Identity (Identity (..))
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
-import Data.Functor.Identity (Identity (..))
 import Data.Maybe (isJust)
 import Data.Void (Void, absurd)
 import System.IO.Unsafe (unsafePerformIO)

@@ -21,10 +21,10 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Runtime.Backend
+import Behavior.Internal.Runtime.OsSleep
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Circle
 import Behavior.Internal.Sim.Enabled
-import Behavior.Internal.Runtime.OsSleep
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State

@@ -15,8 +15,8 @@ module Behavior.Trace.Recording
   ) where
 
 import Control.Applicative ((<|>))
-import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Lazy as LazyIntMap
+import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 import qualified Data.IntSet as IntSet
 import Data.List (foldl', sortOn)

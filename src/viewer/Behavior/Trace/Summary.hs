@@ -9,8 +9,8 @@ module Behavior.Trace.Summary
   , renderSummary
   ) where
 
-import Data.List (foldl', intercalate, sort, sortOn)
 import qualified Data.IntMap.Strict as IntMap
+import Data.List (foldl', intercalate, sort, sortOn)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Ord (Down (..))

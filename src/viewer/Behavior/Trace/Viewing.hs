@@ -15,9 +15,9 @@ module Behavior.Trace.Viewing
 import Control.Applicative ((<|>))
 import Control.Exception (IOException, catch, mask, onException, throwIO, try)
 import Control.Monad (when)
+import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (for_, traverse_)
 import Data.IORef (modifyIORef', newIORef, readIORef, writeIORef)
-import qualified Data.ByteString.Lazy as Bytes
 import Data.Text.Lazy.Encoding (encodeUtf8)
 import Data.Time.Clock.POSIX (posixSecondsToUTCTime)
 import System.IO (hPutStrLn, stderr, stdout)
