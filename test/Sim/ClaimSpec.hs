@@ -180,7 +180,7 @@ names = do
     [ whenever (startOf "low") mempty
     , whenever (startOf "drive") (never (endOf "low"))
     , startOf "low" `comesBefore` startOf "drive"
-    , mempty <> always (running "low")
+    , never (startOf "drive") <> always (running "low")
     , exactly 0 (interruptionOf "low")
     , withinSeconds 1 (startOf "low")
     ]

@@ -255,7 +255,7 @@ whiles = do
       map (\s -> holds (whenever (startOf "charge") (always (running "charge" `heldFor` s))) day) [0, 1] `shouldBe` [False, False]
       holds (whenever (endOf "drive" `during` (being "low" True `heldFor` 0.5)) (withinSeconds 0 (startOf "charge"))) day `shouldBe` True
     it "overlap each other" $
-      for_ [\i -> i `heldFor` 1, \i -> i `heldFor` 1 `heldFor` 1] $ \late ->
+      for_ [(`heldFor` 1), \i -> i `heldFor` 1 `heldFor` 1] $ \late ->
         countOf (late (running "drive") `overlapping` late (being "low" True)) (recordOf rover [line 0 "drive" Begins, line 0 "low" (Becomes "True"), line 5 "drive" Succeeds]) `shouldBe` 1
     it "are those of the interval, if that is one of these" $
       map (\s -> countOf (startOf "charge" `during` (being "low" True `heldFor` 0.5 `heldFor` s)) day) [0.4, 0.5] `shouldBe` [1, 0]
