@@ -63,6 +63,7 @@ import Behavior.Internal.Runtime (Seconds)
 -- own, the last entry before it, with another time.)
 type Line = (Int, RecordEntry)
 
+-- | The time that a line shows.
 time :: Line -> Seconds
 time = entryTime . snd
 
