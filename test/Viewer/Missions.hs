@@ -99,16 +99,18 @@ emergency = map startingEmergency buttoned ++ ended 5 (Inside 1) "motors off" 6 
     Reacted r -> Reacted r {reactionStarts = Just "emergency"}
     _ -> event
 
--- | The wind ends a survey, and then the drone flies home.
+-- | The wind ends a survey: the drone goes down, and then flies home.
 surveyed :: [Event]
 surveyed =
   ended 1 Top "mission" 0 Nothing 9 Succeeded
-    ++ ended 2 (Inside 1) "survey" 0 Nothing 6 Succeeded
-    ++ ended 3 (Inside 2) "film" 0 Nothing 6 (StoppedBy (SignalChanged 4 changes))
-    ++ [Reacted (Reaction 4 (Inside 2) "insteadWhen" 6 changes (Just (StoppedBranch "branch" 6 0 (StoppedBy (SignalChanged 4 changes)))) (Just "emergency"))]
-    ++ ended 5 (Inside 1) "fly home" 6 Nothing 9 Succeeded
+    ++ ended 2 (Inside 1) "survey" 0 Nothing 7 Succeeded
+    ++ ended 3 (Inside 2) "film" 0 Nothing 6 (StoppedBy (SignalChanged 4 wind))
+    ++ [Reacted (Reaction 4 (Inside 2) "insteadWhen" 6 wind (Just stopped) (Just "emergency"))]
+    ++ ended 5 (Inside 2) "go down" 6 (Just 4) 7 Succeeded
+    ++ ended 6 (Inside 1) "fly home" 7 Nothing 9 Succeeded
  where
-  changes = [Change "strong wind" (Just "False") "True"]
+  wind = [Change "strong wind" (Just "False") "True"]
+  stopped = StoppedBranch "branch" 6 0 (StoppedBy (SignalChanged 4 wind))
 
 -- | Ordered rules: a patrol is interrupted by a detection, of which a photograph is made. The rule takes that many
 -- seconds to stop, after it has waited.
@@ -133,7 +135,7 @@ crowdedBy :: Int -> Seconds -> [Event]
 crowdedBy n apart = ended 1 Top "mission" 0 Nothing 60 Succeeded ++ concatMap one [1 .. n]
  where
   one k =
-    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) Nothing (at k) (cause k)
+    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) (if k > 1 then Just (3 * k - 2) else Nothing) (at k) (cause k)
       ++ [Reacted (Reaction (3 * k + 1) (Inside 1) "switch" (at k) (changes k) (Just (stopped k)) (Just "branch"))]
   stopped k = StoppedBranch "branch" 0.4 0 (cause k)
   cause k = StoppedBy (SignalChanged (3 * k + 1) (changes k))

@@ -31,6 +31,7 @@ outline = go (0, 0)
     'h' : rest | ([a], rest') <- arguments 1 rest -> at (x + a, y) rest'
     'v' : rest | ([b], rest') <- arguments 1 rest -> at (x, y + b) rest'
     'l' : rest | ([a, b], rest') <- arguments 2 rest -> at (x + a, y + b) rest'
+    'm' : rest | ([a, b], rest') <- arguments 2 rest -> at (x + a, y + b) rest'
     'L' : rest | ([a, b], rest') <- arguments 2 rest -> at (a, b) rest'
     'C' : rest | ([_, _, _, _, a, b], rest') <- arguments 6 rest -> at (a, b) rest'
     'q' : rest | ([_, _, a, b], rest') <- arguments 4 rest -> at (x + a, y + b) rest'
