@@ -137,6 +137,9 @@ spec = do
       length ranges `shouldBe` 10
       [(b, a') | ((_, b), (a', _)) <- zip (sort ranges) (drop 1 (sort ranges)), a' <= b] `shouldBe` []
       [d | d <- arrows, 'H' `elem` d, 'v' `elem` d] `shouldBe` []
+    it "has no name below bars that are too short for their own" $
+      let below events = [textOf t | t <- allOf "text" (drawn (map (renamedTo "investigate") (filter (not . isReaction) events))), attribute "class" t == "n"]
+       in map below [crowdedBy 5 0.6, crowdedBy 2 0.25 ++ ended 99 (Inside 1) "" 30.5 Nothing 60 Succeeded] `shouldBe` [[], []]
     it "has no arrow over a bar" $ [n | n <- [1 .. 9], not (null (crossed (drawn (robots n))))] `shouldBe` []
 
   describe "shows what runs nowhere" $ do

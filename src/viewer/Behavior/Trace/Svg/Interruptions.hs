@@ -92,7 +92,7 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
     targets = take 12 (concatMap (targetsOf (markerX m)) (markerReactions m))
     sameLanes (a, b) (a', b') = placedLane a == placedLane a' && placedLane b == placedLane b'
     downTo (tip, lane, further, w) =
-      (if w < 8 then shape "ar" else arrow) (downArrow gap (min 4 (w / 3)) (markerX m, rowY m row + 6) (tip, y lane + further))
+      (if w < 8 then shape "ar" else arrow) (downArrow gap (max 1.5 (min 4 (w / 3))) (markerX m, rowY m row + 6) (tip, y lane + further))
     distinct = nubBy (\(_, a, _, _) (_, b, _, _) -> a == b)
   -- (Between slivers in one lane such arrows would be a tangle: each of these bars ends where the next one begins.)
   pairsOf m =
