@@ -1,4 +1,5 @@
-.PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak signals reality attacks mutants ci clean
+.PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak \
+  signals reality attacks mutants ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'

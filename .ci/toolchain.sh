@@ -87,7 +87,8 @@ choose() {
 find_toolchain() {
   [ -z "${BEHAVIOR_TOOLCHAIN:-}" ] || return 0
   choose || { install "${debian_packages[@]}" && choose; } || die \
-    "Nothing to build with: install GHC (9.0 or later) and cabal and run 'cabal update'; or stack; or, on Debian 12 or later, as root: apt-get install ${debian_packages[*]}"
+    "Nothing to build with: install GHC (9.0 or later) and cabal and run 'cabal update'; or stack; or," \
+    "on Debian 12 or later, as root: apt-get install ${debian_packages[*]}"
   export BEHAVIOR_TOOLCHAIN
 }
 
@@ -111,7 +112,9 @@ install() {
     echo "Installing from Debian: ${missing[*]}" >&2
     log=$(mktemp)
     # The package lists are updated only when installing with the present ones fails.
-    if ! { apt_get install "${missing[@]}" || { apt_get update && apt_get install "${missing[@]}"; }; } >"$log" 2>&1; then
+    if ! {
+      apt_get install "${missing[@]}" || { apt_get update && apt_get install "${missing[@]}"; }
+    } >"$log" 2>&1; then
       tail -n 5 "$log" >&2
       rm -f "$log"
       return 1
@@ -126,7 +129,8 @@ install() {
 need() {
   local program
   for program; do
-    has "$program" || install "$program" || die "$program is missing: install it (on Debian, as root: apt-get install $program)"
+    has "$program" || install "$program" ||
+      die "$program is missing: install it (on Debian, as root: apt-get install $program)"
   done
 }
 

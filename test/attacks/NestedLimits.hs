@@ -45,7 +45,7 @@ run :: (IO () -> IO ()) -> [Int] -> (IO () -> IO ()) -> IO String
 run around limits operator = do
   book <- newMVar ([] :: [String])
   let write what = modifyMVar_ book (pure . (what :))
-      nested [] = around (operator slow >> write "result") 
+      nested [] = around (operator slow >> write "result")
       nested (l : ls) = do
         r <- timeout (l * 1000) (nested ls)
         write ("limit " ++ show l ++ " " ++ show r)

@@ -26,7 +26,15 @@ import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject (SubjectKind (ACondition))
 import Behavior.Internal.Mock.World
 import Behavior.Internal.Runtime
-import Behavior.Internal.Signal.Source (Signal (..), Source (workers), View (..), Worker (..), constantView, fromView, namedWith)
+import Behavior.Internal.Signal.Source
+  ( Signal (..)
+  , Source (workers)
+  , View (..)
+  , Worker (..)
+  , constantView
+  , fromView
+  , namedWith
+  )
 
 -- $setup
 -- >>> import Behavior
@@ -82,7 +90,10 @@ condition mock name = partialCondition mock name . map (fmap Just)
 -- @since 0.1.0.0
 partialCondition :: Show a => Mock -> String -> [(Seconds, Maybe a)] -> IO (Condition a)
 partialCondition mock name changes = do
-  checkTimes (<) ("condition " ++ show name ++ ": the times of the changes start from zero and increase") (map fst changes)
+  checkTimes
+    (<)
+    ("condition " ++ show name ++ ": the times of the changes start from zero and increase")
+    (map fst changes)
   register mock ACondition name
   first <- newTVarIO (initial >>= snd)
   rest <- newTVarIO (if isJust initial then drop 1 changes else changes)

@@ -41,7 +41,10 @@ import Behavior.Internal.Runtime
 -- @since 0.1.0.0
 driver :: Show e => Mock -> String -> [(Seconds, e)] -> IO ((e -> IO ()) -> IO (IO ()))
 driver mock name messages = do
-  checkTimes (<=) ("driver " ++ show name ++ ": the times of the messages start from zero and do not decrease") (map fst messages)
+  checkTimes
+    (<=)
+    ("driver " ++ show name ++ ": the times of the messages start from zero and do not decrease")
+    (map fst messages)
   register mock ADriver name
   pure $ \deliver -> do
     (zero, t) <- clock mock

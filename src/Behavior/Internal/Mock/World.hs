@@ -104,7 +104,8 @@ clock mock = do
   t <- now
   here <- simulatedRun
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
-  (own, isFirst) <- atomicModifyIORef' (beginning mock) $ \begun -> let it = fromMaybe first begun in (Just it, (it, isNothing begun))
+  (own, isFirst) <- atomicModifyIORef' (beginning mock) $ \begun ->
+    let it = fromMaybe first begun in (Just it, (it, isNothing begun))
   when isFirst (readIORef (subjects mock) >>= announceActions)
   unless (ownRun own == ownRun first) $ do
     writeIORef (misuse mock) (Just (belongsTo own first))
@@ -114,11 +115,15 @@ clock mock = do
 -- | A world that belongs to the first run is used in the second.
 belongsTo :: Beginning -> Beginning -> ErrorCall
 belongsTo own here = ErrorCall $
-  "a world belongs to the run in which its clock was started; this world's was started " ++ case (ownRun own, ownRun here) of
-    (Nothing, _) ->
-      "outside of the simulation: there, call neither begin nor anything that uses the world (simulate (begin world >> ...) is right)"
-    (_, Just _) -> "in another simulation: make a new one for each run (in an exploration: in the property)"
-    (_, Nothing) -> "in a simulation, which this thread is not part of: outside of it, only read its record (happened, shouldRecord)"
+  "a world belongs to the run in which its clock was started; this world's was started "
+    ++ case (ownRun own, ownRun here) of
+      (Nothing, _) ->
+        "outside of the simulation: there, call neither begin nor anything that uses the world \
+        \(simulate (begin world >> ...) is right)"
+      (_, Just _) -> "in another simulation: make a new one for each run (in an exploration: in the property)"
+      (_, Nothing) ->
+        "in a simulation, which this thread is not part of: outside of it, only read its record \
+        \(happened, shouldRecord)"
 
 -- | Adds an entry to the record. Where exceptions are masked, this neither blocks nor is
 -- interrupted. After the end of the run nothing is recorded.
@@ -205,7 +210,8 @@ shouldRecord mock claim = do
   record <- happened mock
   begun <- readIORef (beginning mock)
   when (isNothing begun) . throwIO . BrokenClaim $
-    "Nothing has used this world, so there is no record to hold. If that is right, begin it: simulate (begin world >> ...)"
+    "Nothing has used this world, so there is no record to hold. If that is right, begin it: \
+    \simulate (begin world >> ...)"
   either (throwIO . BrokenClaim) pure (verdict claim record)
 
 infix 1 `shouldRecord`
