@@ -45,7 +45,9 @@ records :: Spec
 records = do
   forM_
     [ ("at endAt", \act -> simulateWith defaultSimOptions {endAt = 10} (act (sleep 100)))
-    , ("at endAt, when all threads are blocked for ever", \act -> simulateWith defaultSimOptions {endAt = 10} (act (atomically retry)))
+    , ( "at endAt, when all threads are blocked for ever"
+      , \act -> simulateWith defaultSimOptions {endAt = 10} (act (atomically retry))
+      )
     , ("in a deadlock", \act -> simulate (act (atomically retry)))
     , ("in a livelock", \act -> simulateWith defaultSimOptions {livelockLimit = 1000} (act (forever checkpoint)))
     , ("in a deadlock, in another thread", \act -> simulate (both (act (atomically retry)) (sleep 1)))
@@ -65,7 +67,10 @@ records = do
     mock <- newMock
     motor <- motorOf mock
     begun <- newEmptyMVar
-    let going = simulateWith defaultSimOptions {livelockLimit = maxBound} (motor (checkpoint >> putMVar begun () >> forever checkpoint))
+    let going =
+          simulateWith
+            defaultSimOptions {livelockLimit = maxBound}
+            (motor (checkpoint >> putMVar begun () >> forever checkpoint))
     withAsync (void going) $ \caller -> takeMVar begun >> cancel caller
     -- (The cancellation can arrive anywhere in the behaviour, except in its cleanup.)
     countOf (becoming "motor runs" False) <$> happened mock `shouldReturn` 1
@@ -84,18 +89,29 @@ records = do
 
 ends :: Spec
 ends = do
-  for_ [("for a transaction", atomically retry, "a transaction"), ("for the end of an infinite sleep", sleep (1 / 0), "the end of its sleep")] $
-    \(how, forEver, what) -> it ("a run that waits for ever is a deadlock, and the time goes on to the end: " ++ how) $ do
-      run <- simulateWith defaultSimOptions {endAt = 60} (sleep 5 >> forEver)
-      (lines (explain (outcome run)), finished run)
-        `shouldBe` (["deadlock: every thread waits, and nothing in the simulation will wake one", "  main waits for " ++ what], 60)
+  for_
+    [ ("for a transaction", atomically retry, "a transaction")
+    , ("for the end of an infinite sleep", sleep (1 / 0), "the end of its sleep")
+    ]
+    $ \(how, forEver, what) ->
+        it ("a run that waits for ever is a deadlock, and the time goes on to the end: " ++ how) $ do
+        run <- simulateWith defaultSimOptions {endAt = 60} (sleep 5 >> forEver)
+        (lines (explain (outcome run)), finished run)
+          `shouldBe` ( [ "deadlock: every thread waits, and nothing in the simulation will wake one"
+                       , "  main waits for " ++ what
+                       ]
+                     , 60
+                     )
   it "a run that is woken from outside is that, and no deadlock" $ do
     looks <- newIORef (0 :: Int)
     let comesTrue = unsafeIOToSTM (atomicModifyIORef' looks (\n -> (n + 1, n >= 4))) >>= check
     run <- simulateWith defaultSimOptions {endAt = 60} (atomically comesTrue)
     explain (outcome run) `shouldSatisfy` ("something outside of the simulation" `isPrefixOf`)
   it "a run without an end of its own ends then, and the report says who waits for what" $ do
-    run <- simulateWith defaultSimOptions {endAt = 60} (both (forever (sleep 7) :: Behavior ()) (named "dock" (atomically retry)) :: Behavior ())
+    run <-
+      simulateWith
+        defaultSimOptions {endAt = 60}
+        (both (forever (sleep 7) :: Behavior ()) (named "dock" (atomically retry)) :: Behavior ())
     (lines (explain (outcome run)), finished run)
       `shouldBe` ( [ "the virtual time has come to the end that was set"
                    , "  main waits for its branches: both: left, both: right"
@@ -120,7 +136,8 @@ ends = do
         came `shouldSatisfy` (> 10)
         came `shouldSatisfy` (<= finished run)
       _ -> expectationFailure (explain (outcome run))
-    explain (outcome run) `shouldSatisfy` \said -> all (`isInfixOf` said) ["s of virtual time", "see endAt", "see realTimeLimit"]
+    explain (outcome run)
+      `shouldSatisfy` \said -> all (`isInfixOf` said) ["s of virtual time", "see endAt", "see realTimeLimit"]
     over - begun `shouldSatisfy` (< 8)
 
 wells :: Spec
@@ -138,7 +155,8 @@ wells = do
   it "has left no thread running" $ do
     world <- newMock
     messages <- driver world "messages" [(100, 'x')]
-    (simulate (void (messages (const (pure ())))) >>= well) `shouldThrow` (== ErrorCall "it returned, but these threads were left running: driver: messages")
+    (simulate (void (messages (const (pure ())))) >>= well)
+      `shouldThrow` (== ErrorCall "it returned, but these threads were left running: driver: messages")
 
 faults' :: Spec
 faults' = do
@@ -146,7 +164,8 @@ faults' = do
     run <- simulate (throwIO Unshowable :: Behavior ())
     explain (outcome run) `shouldBe` "it faulted: it was <its text throws an exception>"
   it "for such an exception that is thrown in a branch, also in the steps" $ do
-    run <- simulate (parallel (sleep 1) (sleep 2 `catch` \(e :: SomeException) -> throwIO (if null (show e) then toException e else toException Unshowable)))
+    let others (e :: SomeException) = throwIO (if null (show e) then toException e else toException Unshowable)
+    run <- simulate (parallel (sleep 1) (sleep 2 `catch` others))
     explain (outcome run) `shouldBe` "it faulted: it was <its text throws an exception>"
     length (renderSteps (steps run)) `shouldSatisfy` (> 10)
   it "for such an exception that a scripted action throws, also in the record" $ do
@@ -188,5 +207,8 @@ wide = do
     many <- allocated schedule moment 10000
     (many `div` 1000, few `div` 1000) `shouldSatisfy` \(m, f) -> m <= 12 * f
   allocated schedule moment n = allocatedBy $ do
-    run <- simulateWith defaultSimOptions {scheduled = schedule, realTimeLimit = 60} (allOf [sleep (moment i) | i <- [1 .. n :: Int]])
+    run <-
+      simulateWith
+        defaultSimOptions {scheduled = schedule, realTimeLimit = 60}
+        (allOf [sleep (moment i) | i <- [1 .. n :: Int]])
     explain (outcome run) `shouldBe` "it returned"

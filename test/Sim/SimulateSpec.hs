@@ -9,7 +9,7 @@ import Control.Concurrent.Async (async, cancel, concurrently, race, wait, withAs
 import Control.Concurrent.STM (modifyTVar', newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception hiding (Deadlock)
-import Control.Monad (forM_, forever, unless, void)
+import Control.Monad (forM_, forever, replicateM, unless, void)
 import Data.IORef
 import Data.List (isInfixOf, nub)
 import GHC.Conc (unsafeIOToSTM)
@@ -124,7 +124,7 @@ delivery = do
     reached uninterruptibleMask_ (sleep 1) `shouldReturn` ["went on"]
   it "after the last operation: that keeps its effect" $ do
     logged <- newIORef []
-    _ <- simulate (parallel (modifyIORef logged ("went on" :)) (failed :: Behavior ())) 
+    _ <- simulate (parallel (modifyIORef logged ("went on" :)) (failed :: Behavior ()))
     readIORef logged `shouldReturn` ["went on"]
   it "to a thread that has not begun: before its first step" $ do
     logged <- newIORef []
@@ -140,7 +140,11 @@ delivery = do
     requested <- newTVarIO False
     void . simulate $
       parallel
-        (masked (uninterruptibleMask_ (atomically (readTVar requested >>= STM.check)) >> operation >> modifyIORef logged ("went on" :)))
+        ( masked $
+            uninterruptibleMask_ (atomically (readTVar requested >>= STM.check))
+              >> operation
+              >> modifyIORef logged ("went on" :)
+        )
         (atomically (writeTVar requested True) >> (failed :: Behavior ()))
         ? pure ()
     readIORef logged
@@ -162,18 +166,30 @@ mistakes = do
   it "a livelock, and which values its operators go round with" $ do
     hot <- newTVarIO False
     let turn = atomically . writeTVar hot
-        rules = Signal.teleoReactive [(Signal.named "hot" (Signal.watching (readTVar hot)), turn False >> sleep 1), (pure True, turn True >> sleep 1)]
+        rules =
+          Signal.teleoReactive
+            [ (Signal.named "hot" (Signal.watching (readTVar hot)), turn False >> sleep 1)
+            , (pure True, turn True >> sleep 1)
+            ]
     run <- simulateWith defaultSimOptions {livelockLimit = 3000} (sleep 2 >> rules :: Behavior ())
     case outcome run of
       Livelock _ [circle] -> do
-        words circle `shouldSatisfy` \said -> take 2 said == ["teleoReactive", "reacted"] && read (said !! 2) > (100 :: Int)
+        words circle
+          `shouldSatisfy` \said -> take 2 said == ["teleoReactive", "reacted"] && read (said !! 2) > (100 :: Int)
         unwords (drop 3 (words circle)) `shouldBe` "times, to hot True, hot False, and started rule 1, rule 2"
         last (lines (explain (outcome run))) `shouldBe` "  " ++ circle
       _ -> expectationFailure (explain (outcome run))
   it "a livelock after reactions that did not cause it" $ do
     hot <- newTVarIO False
-    let once = Signal.monitor (Signal.named "hot" (Signal.watching (readTVar hot))) (atomically (writeTVar hot False)) (sleep 1)
-    run <- simulateWith defaultSimOptions {livelockLimit = 3000} ((sleep 0.5 >> atomically (writeTVar hot True)) `both` once >> forever checkpoint :: Behavior ())
+    let once =
+          Signal.monitor
+            (Signal.named "hot" (Signal.watching (readTVar hot)))
+            (atomically (writeTVar hot False))
+            (sleep 1)
+    run <-
+      simulateWith
+        defaultSimOptions {livelockLimit = 3000}
+        ((sleep 0.5 >> atomically (writeTVar hot True)) `both` once >> forever checkpoint :: Behavior ())
     explain (outcome run) `shouldBe` "livelock: the virtual time does not advance while these threads run: main"
   it "a livelock of one thread" $ do
     run <- simulateWith defaultSimOptions {livelockLimit = 3000} (forever checkpoint :: Behavior ())
@@ -182,10 +198,16 @@ mistakes = do
     outside "takeMVar" (newEmptyMVar >>= takeMVar) "use atomically and a TMVar"
     outside "threadDelay" (threadDelay 10000000) "use atomically and a TMVar, sleep"
     outside "retry" (STM.atomically retry) "use Behavior.Time.atomically"
-    outside "System.Timeout" (void (System.timeout 10000000 (newEmptyMVar >>= takeMVar :: IO ()))) "Behavior.Time.timeout"
+    outside
+      "System.Timeout"
+      (void (System.timeout 10000000 (newEmptyMVar >>= takeMVar :: IO ())))
+      "Behavior.Time.timeout"
     outside "async" (async (threadDelay 10000000) >>= wait) "use Behavior.Time.atomically, parallel, both, fork"
     outside "race" (void (race (threadDelay 10000000) (threadDelay 10000000))) "use "
-    outside "forkIO" (newEmptyMVar >>= \box -> forkIO (threadDelay 10000000 >> putMVar box ()) >> takeMVar box) "forkIO and a wait for it"
+    outside
+      "forkIO"
+      (newEmptyMVar >>= \box -> forkIO (threadDelay 10000000 >> putMVar box ()) >> takeMVar box)
+      "forkIO and a wait for it"
   it "a cleanup that throws to the thread that waits for its end: both threads are named" $ do
     run <- simulate $ do
       me <- myThreadId
@@ -248,7 +270,9 @@ unwinding = do
     _ <-
       simulate $
         (atomically retry :: Behavior ())
-          `finally` (both (atomically retry :: Behavior ()) (atomically retry :: Behavior ()) `finally` modifyIORef logged ("inner" :))
+          `finally` ( both (atomically retry :: Behavior ()) (atomically retry :: Behavior ())
+                        `finally` modifyIORef logged ("inner" :)
+                    )
           `finally` modifyIORef logged ("outer" :)
     reverse <$> readIORef logged `shouldReturn` ["inner", "outer"]
   it "a behaviour that catches every exception does not continue" $ do
@@ -263,13 +287,17 @@ unwinding = do
     readIORef count `shouldReturn` counted
   it "at endAt, every cleanup has run" $ do
     logged <- newIORef []
-    _ <- simulateWith defaultSimOptions {endAt = 1} (parallel (sleep 5 `finally` modifyIORef logged ("left" :)) (sleep 9 `finally` modifyIORef logged ("right" :)))
+    _ <-
+      simulateWith
+        defaultSimOptions {endAt = 1}
+        (parallel (sleep 5 `finally` modifyIORef logged ("left" :)) (sleep 9 `finally` modifyIORef logged ("right" :)))
     reverse <$> readIORef logged `shouldReturn` ["right", "left"]
   it "by a cancellation of the simulation's caller, every cleanup has run" $ do
     logged <- newIORef []
     begun <- newEmptyMVar
     let going = (putMVar begun () >> forever checkpoint) `finally` modifyIORef logged ("cleaned up" :)
-    withAsync (simulateWith defaultSimOptions {livelockLimit = maxBound} (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
+    let endless = simulateWith defaultSimOptions {livelockLimit = maxBound}
+    withAsync (endless (parallel going (atomically retry :: Behavior ()))) $ \caller -> do
       takeMVar begun
       cancel caller
     readIORef logged `shouldReturn` ["cleaned up"]
@@ -280,11 +308,9 @@ unwinding = do
 beside :: Spec
 beside = do
   it "two simulations at once are independent" $ do
-    alone <- simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission
-    (one, other) <-
-      concurrently
-        (mapM (\_ -> simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission) [1 .. 20 :: Int])
-        (mapM (\_ -> simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission) [1 .. 20 :: Int])
+    let once = simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission
+    alone <- once
+    (one, other) <- concurrently (replicateM 20 once) (replicateM 20 once)
     forM_ (one ++ other) $ \run -> steps run `shouldBe` steps alone
   it "a real behaviour runs in real time" $ do
     begun <- newEmptyMVar

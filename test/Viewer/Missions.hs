@@ -118,11 +118,13 @@ ruled :: Seconds -> [Event]
 ruled took =
   ended 1 Top "mission" 0 Nothing 20 Succeeded
     ++ ended 2 (Inside 1) "patrol" 0 Nothing 6 (StoppedBy (SignalChanged 3 seen))
-    ++ [Reacted (Reaction 3 (Inside 1) "teleoReactive" 6 seen (Just (StoppedBranch "rule 2" 6 0 (StoppedBy (SignalChanged 3 seen)))) (Just "rule 1"))]
+    ++ [Reacted (Reaction 3 (Inside 1) "teleoReactive" 6 seen (Just patrol) (Just "rule 1"))]
     ++ ended 4 (Inside 1) "photograph" 6 (Just 3) 9 Succeeded
-    ++ [Reacted (Reaction 5 (Inside 1) "teleoReactive" 12 gone (Just (StoppedBranch "rule 1" 6 took (StoppedBy (SignalChanged 5 gone)))) (Just "rule 2"))]
+    ++ [Reacted (Reaction 5 (Inside 1) "teleoReactive" 12 gone (Just photograph) (Just "rule 2"))]
     ++ ended 6 (Inside 1) "patrol" (12 + took) (Just 5) 20 Succeeded
  where
+  patrol = StoppedBranch "rule 2" 6 0 (StoppedBy (SignalChanged 3 seen))
+  photograph = StoppedBranch "rule 1" 6 took (StoppedBy (SignalChanged 5 gone))
   seen = [Change "detections" (Just "0") "1"]
   gone = [Change "detections" (Just "1") "0"]
 
