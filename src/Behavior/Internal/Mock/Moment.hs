@@ -40,8 +40,8 @@ module Behavior.Internal.Mock.Moment
   , tolerance
   ) where
 
-import Data.List (intercalate)
-import Data.Maybe (listToMaybe, mapMaybe)
+import Data.List (find, intercalate)
+import Data.Maybe (mapMaybe)
 
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
@@ -310,7 +310,7 @@ being name value =
 
 rangesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Record -> [Range]
 rangesFrom begins ends record =
-  [ Range (at row) (maybe openEnd at (listToMaybe (filter (ends entry . snd) (drop (n + 1) rows)))) row
+  [ Range (at row) (maybe openEnd at (find (ends entry . snd) (drop (n + 1) rows))) row
   | row@(n, entry) <- rows
   , begins entry
   ]
