@@ -48,10 +48,10 @@ fleet shared robots = do
   void (Parallel.allOf (map inService robots))
   failWith "no robot is left"
  where
-  inService robot =
-    named (name robot) $
-      Signal.insteadWhen (withdrawn robot) (logLine shared (name robot ++ " is withdrawn")) (work shared robot)
-      `catchAny` \fault -> logLine shared (name robot ++ " is out of service: " ++ displayException fault)
+  inService robot = named (name robot) (untilWithdrawn robot) `catchAny` \fault ->
+    logLine shared (name robot ++ " is out of service: " ++ displayException fault)
+  untilWithdrawn robot =
+    Signal.insteadWhen (withdrawn robot) (logLine shared (name robot ++ " is withdrawn")) (work shared robot)
 
 -- | Takes orders and carries them out. An order that is interrupted, by the battery or for good, waits
 -- again in its old place, for this robot or another. The drive can be interrupted. The mask keeps an

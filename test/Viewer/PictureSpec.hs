@@ -130,7 +130,7 @@ spec = do
           saidAfter apart = length [t | (t, _) <- said (crowdedBy 2 apart), " after " `isInfixOf` t]
       map saidAfter [4, 7] `shouldBe` [2, 0]
       [map snd (said (crowdedBy 1 apart)) | apart <- [0, 12]] `shouldBe` [[""], [""]]
-      map snd (said [e | e <- crowdedBy 1 29]) `shouldBe` ["e"]
+      map snd (said (crowdedBy 1 29)) `shouldBe` ["e"]
     it "has no tangle of arrows at ten within two seconds" $ do
       let arrows = [d | e <- allOf "path" (drawn (crowdedBy 10 0.2)), attribute "class" e == "ar", let d = attribute "d" e]
           ranges = [(minimum xs, maximum xs) | d <- arrows, 'V' `elem` d, 'H' `notElem` d, let (xs, _) = outline d]

@@ -58,11 +58,10 @@ labels notes right h taken = go (-1) 0 0
     -- A name that is not at its bar could be of another one; also one of a sliver, or one that reaches below a bar that
     -- is too short for its own.
     isClear l =
-      and
-        [ labelFrom l < markRight m && labelTo l > markLeft m
-        , null later || insideOf m > -8
-        , all ((>= 8) . insideOf) (takeWhile ((< labelTo l) . markLeft) later)
-        ]
+      labelFrom l < markRight m
+        && labelTo l > markLeft m
+        && (null later || insideOf m > -8)
+        && all ((>= 8) . insideOf) (takeWhile ((< labelTo l) . markLeft) later)
   belowAt noted m later unnamed = case (notedLines (room left) (text unnamed), notedLines (room furthest) (text True)) of
     ([], []) -> ([], noted)
     ([], texts) -> noteAt (end - width texts) texts

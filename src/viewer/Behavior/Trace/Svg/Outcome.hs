@@ -12,6 +12,7 @@ import qualified Data.IntMap.Strict as IntMap
 import qualified Data.IntSet as IntSet
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
+import Data.Maybe (catMaybes)
 
 import Behavior.Time (Seconds)
 import Behavior.Trace
@@ -78,7 +79,7 @@ endedBySignals r = foldr below IntMap.empty (roots r)
       [(n, x) | x <- reactions r, Inside n <- [reactionParent x], Just b <- [reactionStopped x], stoppedEnd b /= Succeeded]
   latest a b = if (reactionTime a, reactionNumber a) >= (reactionTime b, reactionNumber b) then a else b
   number = spanNumber . nodeSpan
-  below n known = case (nodeEnd n, [x | Just x <- IntMap.lookup (number n) interrupted : map byNumber (nodeChildren n)]) of
+  below n known = case (nodeEnd n, catMaybes (IntMap.lookup (number n) interrupted : map byNumber (nodeChildren n))) of
     (Just (_, Succeeded), found@(_ : _))
       | x <- foldr1 latest found, all (isOver x) (nodeChildren n) -> IntMap.insert (number n) x inside
     _ -> inside
