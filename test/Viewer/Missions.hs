@@ -137,8 +137,9 @@ crowdedBy :: Int -> Seconds -> [Event]
 crowdedBy n apart = ended 1 Top "mission" 0 Nothing 60 Succeeded ++ concatMap one [1 .. n]
  where
   one k =
-    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) (if k > 1 then Just (3 * k - 2) else Nothing) (at k) (cause k)
+    ended (3 * k) (Inside 1) ("go " ++ show k) (at (k - 1)) (startedBy k) (at k) (cause k)
       ++ [Reacted (Reaction (3 * k + 1) (Inside 1) "switch" (at k) (changes k) (Just (stopped k)) (Just "branch"))]
+  startedBy k = if k > 1 then Just (3 * k - 2) else Nothing
   stopped k = StoppedBranch "branch" 0.4 0 (cause k)
   cause k = StoppedBy (SignalChanged (3 * k + 1) (changes k))
   at k = if k == 0 then 0 else 30 + apart * fromIntegral k

@@ -13,8 +13,8 @@ import Behavior.Trace.Describe
 import Behavior.Trace.Recording
 
 -- | The recording in which a reaction stopped nothing, if the branch that it stopped had named spans, all of which had
--- ended: such a branch waits (a rule that has done its work, until its condition no longer holds). Only if something with
--- a name starts, and the branch stopped at once. What a branch contains is known if a reaction started it.
+-- ended: such a branch waits (a rule that has done its work, until its condition no longer holds). Only if something
+-- with a name starts, and the branch stopped at once. What a branch contains is known if a reaction started it.
 endsOfWaits :: Recording -> Recording
 endsOfWaits r = r {reactions = map ended (reactions r)}
  where
@@ -24,11 +24,12 @@ endsOfWaits r = r {reactions = map ended (reactions r)}
     _ -> x
   involved = reactionSpans r
   -- A branch begins when the reaction that starts it has stopped the one before, up to a thousandth of the whole.
-  hadNames x b = case Map.lookupLE (began + tolerance) =<< Map.lookup (reactionParent x, reactionOperator x, stoppedName b) starting of
+  hadNames x b = case Map.lookupLE (began + tolerance) =<< Map.lookup branch starting of
     Just (at, n) | at >= began - tolerance, Just (_, _ : _) <- IntMap.lookup n involved -> True
     _ -> False
    where
     began = reactionTime x - stoppedAfter b
+    branch = (reactionParent x, reactionOperator x, stoppedName b)
   tolerance = (until r - from r) / 1000
   starting =
     Map.fromListWith

@@ -33,18 +33,22 @@ titleText outcomeOf r = unwords (filter (not . null) [lead, remarks])
  where
   (lead, remarks) = heading outcomeOf r
 
--- How the outermost span ended; and how often something was interrupted, what did not succeed, and how much time was spent
--- on what had to begin again.
+-- How the outermost span ended; and how often something was interrupted, what did not succeed, and how much time was
+-- spent on what had to begin again.
 heading :: (Node -> Outcome) -> Recording -> (String, String)
 heading outcomeOf r = (if null remarks then lead else lead ++ ":", intercalate ", " remarks)
  where
   (lead, parts) = case outermost r of
     Just n -> (unwords [nameUpTo 60 n, ending n, "after", secondsText (nodeUntil r n - spanBegan (nodeSpan n))], filter (not . same n) (nodes r))
     Nothing -> (secondsText (until r - from r) ++ " in all", nodes r)
-  remarks = ["interrupted " ++ times interruptions | interruptions > 0] ++ zipWith (\(n, how) these -> show n ++ these ++ how) counted (ofParts : repeat " ") ++ [secondsText again ++ " of work redone" | again > 0]
+  remarks =
+    ["interrupted " ++ times interruptions | interruptions > 0]
+      ++ zipWith (\(n, how) these -> show n ++ these ++ how) counted (ofParts : repeat " ")
+      ++ [secondsText again ++ " of work redone" | again > 0]
   ofParts = " of " ++ some (length parts) "part" ++ " "
   interruptions = length (filter (isJust . reactionStopped) (reactions r))
-  counted = [(n, how) | (o, how) <- [(Failure, "failed"), (Fault, "faulted"), (Running, "not ended")], let n = count o, n > 0]
+  counted = [(n, how) | (o, how) <- remarked, let n = count o, n > 0]
+  remarked = [(Failure, "failed"), (Fault, "faulted"), (Running, "not ended")]
   count o = length (filter ((o ==) . outcomeOf) parts)
   ending n
     | Just x <- IntMap.lookup (spanNumber (nodeSpan n)) (endedBySignals r) = "was ended by " ++ endedBy x
@@ -53,7 +57,8 @@ heading outcomeOf r = (if null remarks then lead else lead ++ ":", intercalate "
   endedBy x =
     intercalate " → " $
       inertUpTo 60 (changesText [c {changeBefore = Nothing} | c <- lastOf (changedOnly (reactionChanges x))])
-        : [quoted (inertUpTo 40 (spanName s)) | (_, s : _) <- maybeToList (IntMap.lookup (reactionNumber x) (reactionSpans r))]
+        : [quoted (inertUpTo 40 (spanName s)) | (_, s : _) <- maybeToList (IntMap.lookup (reactionNumber x) involved)]
+  involved = reactionSpans r
   again = redone outcomeOf r
   lastOf = take 1 . reverse
   same a b = spanNumber (nodeSpan a) == spanNumber (nodeSpan b)

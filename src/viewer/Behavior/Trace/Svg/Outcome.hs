@@ -76,7 +76,12 @@ endedBySignals r = foldr below IntMap.empty (roots r)
   interrupted =
     IntMap.fromListWith
       latest
-      [(n, x) | x <- reactions r, Inside n <- [reactionParent x], Just b <- [reactionStopped x], stoppedEnd b /= Succeeded]
+      [ (n, x)
+      | x <- reactions r
+      , Inside n <- [reactionParent x]
+      , Just b <- [reactionStopped x]
+      , stoppedEnd b /= Succeeded
+      ]
   latest a b = if (reactionTime a, reactionNumber a) >= (reactionTime b, reactionNumber b) then a else b
   number = spanNumber . nodeSpan
   below n known = case (nodeEnd n, catMaybes (IntMap.lookup (number n) interrupted : map byNumber (nodeChildren n))) of
