@@ -141,7 +141,11 @@ signals changes = nameText (changeSignal (last changes)) ++ " changed"
 divergences :: Path -> Int -> [Item] -> [Item] -> [Diverged] -> [Diverged]
 divergences outer depth xs ys rest = foldr compared (reordered ++ rest) (Map.toList pairs)
  where
-  pairs = Map.unionWith (\(x, _) (_, y) -> (x, y)) (Map.map (\x -> (Just x, Nothing)) left) (Map.map (\y -> (Nothing, Just y)) right)
+  pairs =
+    Map.unionWith
+      (\(x, _) (_, y) -> (x, y))
+      (Map.map (\x -> (Just x, Nothing)) left)
+      (Map.map (\y -> (Nothing, Just y)) right)
   left = numbered xs
   right = numbered ys
   compared (key, found) after = case found of
@@ -155,7 +159,12 @@ divergences outer depth xs ys rest = foldr compared (reordered ++ rest) (Map.toL
     (Nothing, Nothing) -> after
   -- One after the other here, and in the opposite order there.
   reordered =
-    [ diverged 1 k (min (itemBegan x) (itemBegan y')) ("ran before " ++ quoted (fst k')) ("ran after " ++ quoted (fst k'))
+    [ diverged
+        1
+        k
+        (min (itemBegan x) (itemBegan y'))
+        ("ran before " ++ quoted (fst k'))
+        ("ran after " ++ quoted (fst k'))
     | let common = sortOn (itemBegan . fst . snd) (Map.toList (Map.intersectionWith (,) left right))
     , ((k, (x, y)), (k', (x', y'))) <- zip common (drop 1 common)
     , itemEnded x <= itemBegan x'
@@ -183,7 +192,10 @@ renderDifference :: Difference -> String
 renderDifference d = unlines (remarks ++ diverging ++ [""] ++ taking)
  where
   remarks =
-    [which ++ ": " ++ lostRemark n | (which, n) <- [("First", fst (lostOnEachSide d)), ("Second", snd (lostOnEachSide d))], n /= 0]
+    [ which ++ ": " ++ lostRemark n
+    | (which, n) <- [("First", fst (lostOnEachSide d)), ("Second", snd (lostOnEachSide d))]
+    , n /= 0
+    ]
   diverging = case firstDivergence d of
     Nothing -> ["First divergence: none"]
     Just x ->
@@ -196,7 +208,11 @@ renderDifference d = unlines (remarks ++ diverging ++ [""] ++ taking)
     | null (timesByPath d) = ["Time by path: no difference"]
     | otherwise =
         "Time by path"
-          : columns 5 ["difference [s]", "first [s]", "second [s]", "first runs", "second runs", "path"] row (timesByPath d)
+          : columns
+            5
+            ["difference [s]", "first [s]", "second [s]", "first runs", "second runs", "path"]
+            row
+            (timesByPath d)
   row (where', x, y) =
     [ signed (sideTotal y - sideTotal x)
     , milliseconds (sideTotal x)

@@ -161,7 +161,8 @@ data NoEvent
 decodeEvent :: Bytes.ByteString -> Either NoEvent Event
 decodeEvent content
   | nestsDeeperThan 100 content = Left (NotAnEvent "it nests deeper than 100; allowed: an event, which nests 6 deep")
-  | otherwise = either (Left . NotJson) Right (eitherDecode content) >>= either (Left . NotAnEvent) Right . parseEither event
+  | otherwise =
+      either (Left . NotJson) Right (eitherDecode content) >>= either (Left . NotAnEvent) Right . parseEither event
 
 event :: Value -> Parser Event
 event = withObject "an event" $ \o ->
@@ -195,7 +196,9 @@ numbered o = do
   n <- o .: "number" >>= from1 "number"
   parent <- o .: "parent" >>= parentOf
   case parent of
-    Inside p | p < 1 || p >= n -> fail ("parent is " ++ show p ++ "; allowed: a number from 1 that is less than its own, " ++ show n)
+    Inside p
+      | p < 1 || p >= n ->
+          fail ("parent is " ++ show p ++ "; allowed: a number from 1 that is less than its own, " ++ show n)
     _ -> pure (n, parent)
 
 from1 :: String -> Int -> Parser Int
@@ -252,4 +255,5 @@ choose :: Object -> Key -> [(String, Parser a)] -> Parser a
 choose o key table =
   o .: key >>= withText (show key) (\name -> fromMaybe (refuse (Text.unpack name)) (lookup (Text.unpack name) table))
  where
-  refuse name = fail (show key ++ " is " ++ show (inertUpTo 60 name) ++ "; allowed: " ++ intercalate ", " (map fst table))
+  refuse name =
+    fail (show key ++ " is " ++ show (inertUpTo 60 name) ++ "; allowed: " ++ intercalate ", " (map fst table))

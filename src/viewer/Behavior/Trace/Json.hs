@@ -69,7 +69,8 @@ number x
 -- bytes of memory for each bracket.
 nestsDeeperThan :: Int -> Bytes.ByteString -> Bool
 nestsDeeperThan limit content =
-  Bytes.count '[' content + Bytes.count '{' content > fromIntegral limit && deepest (Bytes.foldl' next (Outside 0 0) content) > limit
+  Bytes.count '[' content + Bytes.count '{' content > fromIntegral limit
+    && deepest (Bytes.foldl' next (Outside 0 0) content) > limit
  where
   next state c = case state of
     Outside d m

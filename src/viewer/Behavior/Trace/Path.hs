@@ -68,7 +68,8 @@ shownInnermost = 8
 -- @since 0.1.0.0
 renderPath :: Path -> String
 renderPath p
-  | more > 1 = shown (outermost p ++ ["... (" ++ show more ++ " more)"] ++ reverse (take shownInnermost (innermostFirst p)))
+  | more > 1 =
+      shown (outermost p ++ ["... (" ++ show more ++ " more)"] ++ reverse (take shownInnermost (innermostFirst p)))
   | otherwise = shown (reverse (innermostFirst p))
  where
   more = depth p - shownOutermost - shownInnermost

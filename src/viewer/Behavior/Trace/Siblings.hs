@@ -11,8 +11,8 @@ import Prelude hiding (until)
 import Behavior.Trace
 import Behavior.Trace.Recording
 
--- | With the name of the span that finished or failed in place of the name of its branch. That is the last one that ended
--- beside what was stopped, if it ended at the same time: at most a thousandth of the whole earlier.
+-- | With the name of the span that finished or failed in place of the name of its branch. That is the last one that
+-- ended beside what was stopped, if it ended at the same time: at most a thousandth of the whole earlier.
 withSiblings :: Recording -> Recording
 withSiblings r = r {roots = level (roots r)}
  where

@@ -117,7 +117,8 @@ timesOfBoth r s = both (path []) (gather r (roots r)) (gather s (roots s)) []
 gather :: Recording -> [Node] -> Level
 gather r = level
  where
-  level found = Level (Map.map merge (Map.fromListWith (++) [(spanName (nodeSpan n), [n]) | n <- reverse (foldr named [] found)]))
+  level found =
+    Level (Map.map merge (Map.fromListWith (++) [(spanName (nodeSpan n), [n]) | n <- reverse (foldr named [] found)]))
   merge same = (map run same, level (concatMap nodeChildren same))
   run n = (max 0 (nodeUntil r n - spanBegan (nodeSpan n)), snd <$> nodeEnd n)
   -- Operators and branches are no part of a path.
@@ -143,7 +144,8 @@ timesOf found =
 
 -- A reaction may have been lost; then the spans that it stopped say that there was one.
 bySignal :: Recording -> Map String Interruptions
-bySignal r = Map.fromListWith plus [(signal changes, Interruptions 1 took) | (changes, took) <- IntMap.elems (reacted <> inferred)]
+bySignal r =
+  Map.fromListWith plus [(signal changes, Interruptions 1 took) | (changes, took) <- IntMap.elems (reacted <> inferred)]
  where
   plus (Interruptions n t) (Interruptions m u) = Interruptions (n + m) (t + u)
   signal changes = if null changes then "" else changeSignal (last changes)
@@ -154,7 +156,10 @@ bySignal r = Map.fromListWith plus [(signal changes, Interruptions 1 took) | (ch
     IntMap.fromList [(n, (changes, 0)) | Just (_, StoppedBy (SignalChanged n changes)) <- map nodeEnd (nodes r)]
 
 counted :: [String] -> [(String, Int)]
-counted = sortOn (\(what, n) -> (Down n, what)) . Map.toList . foldl' (\known what -> Map.insertWith (+) what 1 known) Map.empty
+counted =
+  sortOn (\(what, n) -> (Down n, what))
+    . Map.toList
+    . foldl' (\known what -> Map.insertWith (+) what 1 known) Map.empty
 
 -- | The summary as text: three tables, and a remark if events were lost.
 --
@@ -181,5 +186,8 @@ renderSummary s =
     ]
   percent n m = show (round (100 * fromIntegral n / fromIntegral m :: Double) :: Int) ++ " %"
   interruptionRow (signal, i) =
-    [show (interrupted i), milliseconds (stopping i), if null signal then "a signal without a name" else nameText signal]
+    [ show (interrupted i)
+    , milliseconds (stopping i)
+    , if null signal then "a signal without a name" else nameText signal
+    ]
   failureRow (where', what, n) = [show n, renderPath where' ++ ": " ++ what]

@@ -33,8 +33,9 @@ import Behavior.Trace.Svg.TimeSpent
 
 -- | The recording as an SVG file: the time from left to right, each span as a bar below the one
 -- that it runs in. The colour and the right end of a bar say how it ended. An interruption is an
--- arrow from the change of the signal to what was stopped, and on to what was started. The mark of a change that stopped
--- nothing is hollow. At the top: how it ended, where most of the time went, and what the marks mean that occur.
+-- arrow from the change of the signal to what was stopped, and on to what was started. The mark of a change that
+-- stopped nothing is hollow. At the top: how it ended, where most of the time went, and what the marks mean that
+-- occur.
 --
 -- The file needs no other file and contains no script. Its text is ASCII. Spans too narrow to be
 -- seen are drawn together; what failed, faulted or was stopped is always visible.
@@ -65,7 +66,8 @@ timeline recorded =
   idle = pauses x r placed
   lanes = if null placed then 1 else 1 + maximum (map placedLane placed)
   (barHeight, gap) = if lanes <= 16 then (24, 16) else (16, 7)
-  interruptions = layInterruptions margin (width - 8) (barHeight, gap) x y placed [(pauseLane p, (pauseLeft p, pauseRight p)) | p <- idle] r
+  interruptions = layInterruptions margin (width - 8) (barHeight, gap) x y placed pausesByLane r
+  pausesByLane = [(pauseLane p, (pauseLeft p, pauseRight p)) | p <- idle]
   texts = labels (gap > 10) (width - 4) barHeight (interruptionsBelow interruptions) drawn
   (explained, further) = legend margin (width - margin) used
   axisTop = 112 + further
@@ -79,7 +81,8 @@ timeline recorded =
       }
   -- Above a lane are the interruptions of what is in it. One with two lines of text below its bars is higher.
   y lane = fromMaybe 0 (IntMap.lookup lane tops)
-  tops = IntMap.fromList (zip [0 ..] (zipWith (+) (scanl (+) (axisTop + 24) (map height [0 .. lanes - 1])) (map above [0 .. lanes])))
+  tops = IntMap.fromList (zip [0 ..] (zipWith (+) laneTops (map above [0 .. lanes])))
+  laneTops = scanl (+) (axisTop + 24) (map height [0 .. lanes - 1])
   above lane = maybe 0 (+ aboveBars) (IntMap.lookup lane (interruptionsAbove interruptions))
   height lane = above lane + barHeight + gap + (if IntSet.member lane higher then 13 else 0)
   higher = IntSet.fromList [labelLane l | l <- texts, labelLinesBelow l > 1]
@@ -96,7 +99,11 @@ timeline recorded =
    where
     x' = x . (from r +) . realToFrac
   -- What is free of texts beside bars.
-  free p = foldl without (pauseLeft p, pauseRight p) [l | l <- texts, labelLane l == pauseLane p, labelLinesBelow l == 0]
+  free p =
+    foldl
+      without
+      (pauseLeft p, pauseRight p)
+      [l | l <- texts, labelLane l == pauseLane p, labelLinesBelow l == 0]
   without (a, b) l
     | labelTo l <= a || labelFrom l >= b = (a, b)
     | labelFrom l + labelTo l < a + b = (labelTo l + 2, b)
@@ -114,7 +121,8 @@ fromSeconds = realToFrac
 -- Round steps, about ten of them.
 ticks :: Double -> [(Double, String)]
 ticks total
-  | total > 0, not (isInfinite total) = [(t, secondsText (realToFrac t)) | k <- [0 .. 20 :: Int], let t = fromIntegral k * step, t <= total * 1.0001]
+  | total > 0, not (isInfinite total) =
+      [(t, secondsText (realToFrac t)) | k <- [0 .. 20 :: Int], let t = fromIntegral k * step, t <= total * 1.0001]
   | otherwise = [(0, "0 s")]
  where
   step = head ([s | m <- [1, 2, 5, 10], let s = m * magnitude, total / s <= 12] ++ [10 * magnitude])
@@ -126,7 +134,10 @@ bar limit y h r stopRequests m
   | otherwise = group "" (path (Text.unwords ["b", class']) (barShape outcome (markLeft m) top w h) about : stopping)
  where
   outcome = markOutcome m
-  class' = if isMerged m && outcome `elem` [Success, RanAgain, CutShort] && w >= 3 then "v2 " <> outcomeClass outcome else outcomeClass outcome
+  class' =
+    if isMerged m && outcome `elem` [Success, RanAgain, CutShort] && w >= 3
+      then "v2 " <> outcomeClass outcome
+      else outcomeClass outcome
   top = y (markLane m)
   w = markRight m - markLeft m
   about = titled $ if isMerged m then severalSpans m else aboutSpan limit r (markNode m)

@@ -47,10 +47,10 @@ import Behavior.Trace.Terminal.Tree
 -- | Shows the events that the function gets, in the terminal: a tree of what runs, redrawn in place
 -- at most ten times a second. At the end the last tree stays.
 --
--- What the program prints meanwhile on the standard output or the standard error appears above the tree, whole and in order: also
--- by foreign code, and by processes that it starts. A line that is not complete is the first line of the tree until it is. (All these
--- write into a pipe, and so they see no terminal. If the program is killed by SIGKILL, what was in the pipe is lost. In a program
--- without @-threaded@, and on Windows, output disturbs the tree.)
+-- What the program prints meanwhile on the standard output or the standard error appears above the tree, whole and in
+-- order: also by foreign code, and by processes that it starts. A line that is not complete is the first line of the
+-- tree until it is. (All these write into a pipe, and so they see no terminal. If the program is killed by SIGKILL,
+-- what was in the pipe is lost. In a program without @-threaded@, and on Windows, output disturbs the tree.)
 --
 -- If the handle is no terminal, each event is written as a line of text.
 --
@@ -69,8 +69,8 @@ withTerminal h use = do
       redrawn terminal safe use
     else use (\events -> mapM_ (hPutStrLn h . safe . plainLine) events *> hFlush h)
 
--- What is on the screen below the lines that were printed: the tree, and above it the line that is not complete. If that is
--- too long, it has been printed as far as it is known, and there is no tree until it ends.
+-- What is on the screen below the lines that were printed: the tree, and above it the line that is not complete. If
+-- that is too long, it has been printed as far as it is known, and there is no tree until it ends.
 data Shown = Shown
   { shownTree :: [Line]
   , incomplete :: !Bytes.ByteString
@@ -97,13 +97,15 @@ redrawn h safe use = do
         (rows, wide) <- windowSize h
         let time = maybe 0 (+ realToFrac (present - arrived)) (liveTime live)
             tree = treeLines rows wide time live
-        onScreen $ \s -> if tree == shownTree s || isNothing (liveTime live) then pure s else redraw s {shownTree = tree}
+        onScreen $ \s ->
+          if tree == shownTree s || isNothing (liveTime live) then pure s else redraw s {shownTree = tree}
       onScreen f = modifyMVar_ screen (\s -> f s <* hFlush h)
       redraw s
         | isOpen s = pure s
         | otherwise = do
             (rows, wide) <- windowSize h
-            let below = take rows ([[(Normal, cutTo wide (lastPart (incomplete s)))] | not (Bytes.null (incomplete s))] ++ shownTree s)
+            let partial = [[(Normal, cutTo wide (lastPart (incomplete s)))] | not (Bytes.null (incomplete s))]
+                below = take rows (partial ++ shownTree s)
             hPutStr h (frame colours safe (linesDrawn s) below)
             pure s {linesDrawn = length below}
       erase s

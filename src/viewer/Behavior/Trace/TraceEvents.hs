@@ -227,9 +227,12 @@ flows r spans = concat (zipWith flow [1 ..] interruptions)
     , started <- startedSpans
     , at <= begins started
     ]
-  startedBy = IntMap.fromListWith (++) [(n, [p]) | p <- reverse spans, Just n <- [spanReaction (nodeSpan (placedNode p))]]
+  startedBy =
+    IntMap.fromListWith (++) [(n, [p]) | p <- reverse spans, Just n <- [spanReaction (nodeSpan (placedNode p))]]
   stoppedFirst =
-    IntMap.fromListWith (\_ first -> first) [(n, p) | p <- spans, not (stoppedInside p), Just n <- [stoppedBy (placedNode p)]]
+    IntMap.fromListWith
+      (\_ first -> first)
+      [(n, p) | p <- spans, not (stoppedInside p), Just n <- [stoppedBy (placedNode p)]]
   -- When the operator decided. A viewer looks for the span in which the flow begins; at its very end
   -- it finds none, and just before that the instant event.
   leaves n p = max (begins p) (min (ends p - 2) (IntMap.findWithDefault (ends p) n decided))

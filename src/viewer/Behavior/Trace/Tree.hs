@@ -40,7 +40,10 @@ renderTree recorded = unlines (heading : inOrder (map (reaction 0) loose ++ map 
   branch depth node =
     ( spanBegan s
     , (row (milliseconds (spanBegan s)) (milliseconds (nodeUntil r node - spanBegan s)) (indented depth (title node)) :)
-        . inOrder (map (reaction (depth + 1)) (IntMap.findWithDefault [] (spanNumber s) inside) ++ map (branch (depth + 1)) (nodeChildren node))
+        . inOrder
+          ( map (reaction (depth + 1)) (IntMap.findWithDefault [] (spanNumber s) inside)
+              ++ map (branch (depth + 1)) (nodeChildren node)
+          )
     )
    where
     s = nodeSpan node

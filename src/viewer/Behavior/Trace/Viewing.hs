@@ -61,7 +61,8 @@ nothing = Viewing {traceFile = Nothing, timelineFile = Nothing, liveTree = False
 --
 -- @since 0.1.0.0
 viewing :: Viewing -> Behavior a -> Behavior a
-viewing v act = toFile $ \file -> toTimeline $ \kept -> toTerminal $ \tree -> withTrace (map Batches (file ++ kept ++ tree)) act
+viewing v act =
+  toFile $ \file -> toTimeline $ \kept -> toTerminal $ \tree -> withTrace (map Batches (file ++ kept ++ tree)) act
  where
   toFile use = maybe (use []) (`toTraceFile` use) (traceFile v)
   toTerminal use = if liveTree v then withTerminal stdout (use . pure) else use []

@@ -20,12 +20,13 @@ import Behavior.Trace.Svg.Outcome
 
 -- | The title, no wider than that number of pixels.
 title :: (Node -> Outcome) -> Double -> Recording -> [Part]
-title outcomeOf width r = filter (not . null . snd) [("", lead), ("tr", fitted ((width - large lead - large missing) * 12 / 14) remarks), ("w", missing)]
+title outcomeOf width r = filter (not . null . snd) [("", lead), ("tr", fitted room remarks), ("w", missing)]
  where
   (known, remarks) = heading outcomeOf r
   lead = fitted (width / 1.68 - textWidth missing) known
   missing = if lost r > 0 then lostText (lost r) else ""
   large text = 1.68 * textWidth text + 7
+  room = (width - large lead - large missing) * 12 / 14
 
 -- | The title without the remark about lost events.
 titleText :: (Node -> Outcome) -> Recording -> String
@@ -39,7 +40,10 @@ heading :: (Node -> Outcome) -> Recording -> (String, String)
 heading outcomeOf r = (if null remarks then lead else lead ++ ":", intercalate ", " remarks)
  where
   (lead, parts) = case outermost r of
-    Just n -> (unwords [nameUpTo 60 n, ending n, "after", secondsText (nodeUntil r n - spanBegan (nodeSpan n))], filter (not . same n) (nodes r))
+    Just n ->
+      ( unwords [nameUpTo 60 n, ending n, "after", secondsText (nodeUntil r n - spanBegan (nodeSpan n))]
+      , filter (not . same n) (nodes r)
+      )
     Nothing -> (secondsText (until r - from r) ++ " in all", nodes r)
   remarks =
     ["interrupted " ++ times interruptions | interruptions > 0]

@@ -51,10 +51,18 @@ data Effect = Interrupts | OnlyStarts
   deriving (Eq, Show)
 
 -- | Given the pixels between which they are; the height of a bar, and the space between two; where a time is, and
--- where a lane is, with what is above it; the spans; in which lane and between which pixels nothing runs that has a name;
--- the recording. Only what is drawn depends on where the lanes are.
+-- where a lane is, with what is above it; the spans; in which lane and between which pixels nothing runs that has a
+-- name; the recording. Only what is drawn depends on where the lanes are.
 layInterruptions
-  :: Double -> Double -> (Double, Double) -> (Seconds -> Double) -> (Int -> Double) -> [Placed] -> [(Int, (Double, Double))] -> Recording -> Interruptions
+  :: Double
+  -> Double
+  -> (Double, Double)
+  -> (Seconds -> Double)
+  -> (Int -> Double)
+  -> [Placed]
+  -> [(Int, (Double, Double))]
+  -> Recording
+  -> Interruptions
 layInterruptions left right (barHeight, gap) x y placed pauses recorded =
   Interruptions
     { interruptionsAbove = IntMap.map ((rowHeight *) . fromIntegral . rowCount) byLane
@@ -66,7 +74,8 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
  where
   markers = map fst labelled
   labelled = concat (IntMap.elems byLane)
-  byLane = IntMap.map inRows (IntMap.fromListWith (++) [(laneOf r, [(x (reactionTime r), r)]) | r <- sortOn (\r -> Down (reactionTime r, reactionNumber r)) shown])
+  byLane = IntMap.map inRows (IntMap.fromListWith (++) [(laneOf r, [(x (reactionTime r), r)]) | r <- newestFirst])
+  newestFirst = sortOn (\r -> Down (reactionTime r, reactionNumber r)) shown
   inRows found@((_, r) : _) = zip ms (rowsFor left right most names ms)
    where
     (ms, most) = case map (\d -> together d (laneOf r) found) [0, 4, 8] of
@@ -77,12 +86,18 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
       _ -> ([], 0)
   inRows [] = []
   rowCount rows = 1 + maximum (map (fst . snd) rows)
-  rowY m row = y (markerLane m) - aboveBars - rowHeight * fromIntegral (maybe 0 rowCount (IntMap.lookup (markerLane m) byLane) - row) + 9
+  rowY m row = y (markerLane m) - aboveBars - rowHeight * fromIntegral (rows - row) + 9
+   where
+    rows = maybe 0 rowCount (IntMap.lookup (markerLane m) byLane)
   shown = filter visible (reactions recorded)
   visible r = isJust (reactionStopped r) || IntMap.member (reactionNumber r) started
   stopped = outermost [(n, p) | p <- placed, Just (_, StoppedBy (SignalChanged n _)) <- [nodeEnd (placedNode p)]]
   started = outermost [(n, p) | p <- placed, Just n <- [spanReaction (nodeSpan (placedNode p))]]
-  names r = bimap (map (\s -> (spanName s, spanBegan s))) (fmap spanName . listToMaybe) (IntMap.findWithDefault ([], []) (reactionNumber r) involved)
+  names r =
+    bimap
+      (map (\s -> (spanName s, spanBegan s)))
+      (fmap spanName . listToMaybe)
+      (IntMap.findWithDefault ([], []) (reactionNumber r) involved)
   involved = reactionSpans recorded
   byNumber = IntMap.fromList [(spanNumber (nodeSpan (placedNode p)), p) | p <- placed]
 
@@ -92,7 +107,8 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
     targets = take 12 (concatMap (targetsOf (markerX m)) (markerReactions m))
     sameLanes (a, b) (a', b') = placedLane a == placedLane a' && placedLane b == placedLane b'
     downTo (tip, lane, further, w) =
-      (if w < 8 then shape "ar" else arrow) (downArrow gap (max 1.5 (min 4 (w / 3))) (markerX m, rowY m row + 6) (tip, y lane + further))
+      (if w < 8 then shape "ar" else arrow)
+        (downArrow gap (max 1.5 (min 4 (w / 3))) (markerX m, rowY m row + 6) (tip, y lane + further))
     distinct = nubBy (\(_, a, _, _) (_, b, _, _) -> a == b)
   -- (Between slivers in one lane such arrows would be a tangle: each of these bars ends where the next one begins.)
   pairsOf m =
@@ -104,7 +120,9 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
   targetsOf at r = case (find' stopped r, find' started r) of
     ([], []) -> case reactionParent r of
       Inside n | Just p <- IntMap.lookup n byNumber ->
-        if any (isPause (placedLane p + 1) at) pauses then [(at, placedLane p + 1, barHeight / 2 - 2, 10)] else [(at, placedLane p, 0, 10)]
+        if any (isPause (placedLane p + 1) at) pauses
+          then [(at, placedLane p + 1, barHeight / 2 - 2, 10)]
+          else [(at, placedLane p, 0, 10)]
       _ -> []
     ([], p : _) -> [(max at (afterBegin 8 p), placedLane p, 0, widthOf p)]
     (ps, _) -> [(min at (beforeEnd 8 p), placedLane p, 0, widthOf p) | p <- ps]
@@ -114,7 +132,10 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
     targets -> minimum [lane | (_, lane, _, _) <- targets]
   onward from to
     | placedLane from == placedLane to = bracket (min 9 (gap - 3)) (ends from to) (y (placedLane from) + barHeight)
-    | otherwise = onwardCurve (fst (ends from to), y (placedLane from) + barHeight) (placedLeft to, y (placedLane to) + barHeight / 2)
+    | otherwise =
+        onwardCurve
+          (fst (ends from to), y (placedLane from) + barHeight)
+          (placedLeft to, y (placedLane to) + barHeight / 2)
   arrow = if isThin then shape "ar" else arrowOver
   isThin = not (isFew 40 markers)
   isFew n = null . drop n
@@ -168,13 +189,15 @@ arrowOver d = group "" [shape "ha" d, shape "ar" d]
 downArrow :: Double -> Double -> (Double, Double) -> (Double, Double) -> Text
 downArrow gap side (x, from) (tip, to)
   | abs (tip - x) < 0.5 = Text.concat ["M", px x, " ", px from, "V", px to, headTowards side 0 1]
-  | otherwise = Text.concat ["M", px x, " ", px from, "V", px (to - bend), "L", px tip, " ", px to, headTowards side (tip - x) bend]
+  | otherwise = Text.concat
+      ["M", px x, " ", px from, "V", px (to - bend), "L", px tip, " ", px to, headTowards side (tip - x) bend]
  where
   bend = min 10 (gap - 1)
 
 -- The head of an arrow that goes there.
 headTowards :: Double -> Double -> Double -> Text
-headTowards side dx dy = "m" <> pair (bx - sx) (by - sy) <> "l" <> pair (sx - bx) (sy - by) <> " " <> pair (bx + sx) (by + sy)
+headTowards side dx dy =
+  "m" <> pair (bx - sx) (by - sy) <> "l" <> pair (sx - bx) (sy - by) <> " " <> pair (bx + sx) (by + sy)
  where
   pair a b = px a <> " " <> px b
   far = sqrt (dx * dx + dy * dy)
@@ -189,7 +212,11 @@ bracket depth (a, b) bottom =
 -- From the lower edge of what was stopped to the left edge of what was started, in another lane.
 onwardCurve :: (Double, Double) -> (Double, Double) -> Text
 onwardCurve (a, bottom) (left, middle) =
-  Text.concat ["M", px a, " ", px bottom, "C", px a, " ", px middle, " ", px (left - 12), " ", px middle, " ", px left, " ", px middle, headTowards 4 1 0]
+  Text.concat
+    [ "M", px a, " ", px bottom
+    , "C", px a, " ", px middle, " ", px (left - 12), " ", px middle, " ", px left, " ", px middle
+    , headTowards 4 1 0
+    ]
 
 -- Where an arrow from what was stopped to what was started begins and ends: never so near to each other that
 -- it cannot be seen.
@@ -212,4 +239,6 @@ afterBegin d p = placedLeft p + min d (widthOf p / 3)
 -- | What an arrow looks like, for the legend.
 arrowSample :: Effect -> Double -> Double -> Element
 arrowSample e x y =
-  group "" [shape (effectClass e) (diamond (x + 5) y), shape "ar" (Text.concat ["M", px (x + 11), " ", px y, "H", px (x + 27), headTowards 4 1 0])]
+  group "" [shape (effectClass e) (diamond (x + 5) y), shape "ar" stroke]
+ where
+  stroke = Text.concat ["M", px (x + 11), " ", px y, "H", px (x + 27), headTowards 4 1 0]

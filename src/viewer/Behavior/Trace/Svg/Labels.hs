@@ -20,8 +20,8 @@ import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Layout
 import Behavior.Trace.Svg.Outcome
 
--- | A text of a bar: in which lane, how many of its lines are below the bar, between which pixels, and what to draw, given
--- the upper edge of the bar.
+-- | A text of a bar: in which lane, how many of its lines are below the bar, between which pixels, and what to draw,
+-- given the upper edge of the bar.
 data Label = Label
   { labelLane :: !Int
   , labelLinesBelow :: !Int
@@ -62,13 +62,20 @@ labels notes right h taken = go (-1) 0 0
         && labelTo l > markLeft m
         && (null later || insideOf m > -8)
         && all ((>= 8) . insideOf) (takeWhile ((< labelTo l) . markLeft) later)
-  belowAt noted m later unnamed = case (notedLines (room left) (text unnamed), notedLines (room furthest) (text True)) of
+  belowAt noted m later unnamed = case (notedLines (room left) (text unnamed), inFull) of
     ([], []) -> ([], noted)
     ([], texts) -> noteAt (end - width texts) texts
     (texts, _) -> noteAt left texts
    where
+    inFull = notedLines (room furthest) (text True)
     noteAt x texts =
-      ( [Label (markLane m) (length texts) x (x + width texts) (\top -> [textAt classes x (top + h + dy) [("", t)] | (dy, t) <- zip [12, 25] texts])]
+      ( [ Label
+            (markLane m)
+            (length texts)
+            x
+            (x + width texts)
+            (\top -> [textAt classes x (top + h + dy) [("", t)] | (dy, t) <- zip [12, 25] texts])
+        ]
       , x + width texts + 8
       )
     classes = if isNoted m then "n n" <> outcomeClass (markOutcome m) else "n"
@@ -76,7 +83,9 @@ labels notes right h taken = go (-1) 0 0
     left = foldl past (max (markLeft m) noted) there
     past at (l, r) = if at > l && at < r then r else at
     furthest = maximum (noted : [r | (_, r) <- there, r <= left])
-    end = minimum (right - 4 : [l | (l, _) <- there, l >= left] ++ [markLeft o - 6 | o <- later, isNoted o, not (fitsWhole o)])
+    end =
+      minimum $
+        right - 4 : [l | (l, _) <- there, l >= left] ++ [markLeft o - 6 | o <- later, isNoted o, not (fitsWhole o)]
     there = [interval | (lane, interval) <- taken, lane == markLane m]
     room from = (end - from) * 12 / 11
     text isNamed = inertUpTo 120 (intercalate ": " ([nameOf m | isNamed] ++ maybeToList (whyOf m)))
@@ -125,7 +134,11 @@ name right h used m next
   onTwo (one, two) = inSmall [(-1.5, one), (9, two)]
   small one = inSmall [(3.5, one)]
   inSmall texts =
-    ( [(left, markRight m, \top -> [textAt (groundAt left <> " z") left (top + h / 2 + dy) [("", t)] | (dy, t) <- texts])]
+    ( [ ( left
+        , markRight m
+        , \top -> [textAt (groundAt left <> " z") left (top + h / 2 + dy) [("", t)] | (dy, t) <- texts]
+        )
+      ]
     , markRight m
     , False
     )

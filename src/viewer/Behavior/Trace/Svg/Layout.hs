@@ -46,7 +46,12 @@ place :: (Node -> (Double, Double)) -> [Node] -> [Placed]
 place pixels = absolute . fst . pack . map block
  where
   block n =
-    Block (Placed n 0 left right False) height (minimum (left : map leftOf inner)) (maximum (right : map rightOf inner)) packed
+    Block
+      (Placed n 0 left right False)
+      height
+      (minimum (left : map leftOf inner))
+      (maximum (right : map rightOf inner))
+      packed
    where
     (left, right) = pixels n
     inner = map block (nodeChildren n)

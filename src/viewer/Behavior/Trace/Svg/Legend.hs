@@ -30,7 +30,9 @@ data Used = Used
 legend :: Double -> Double -> Used -> (Element, Double)
 legend left right used = (group "le" (concat drawn), maximum (0 : downs))
  where
-  (drawn, downs) = unzip [([draw x (73 + down), textAt "q" (x + 32) (84 + down) [("", word)]], down) | ((draw, word), (x, down)) <- zip entries (scanl after (left, 0) (zip entries (drop 1 entries)))]
+  (drawn, downs) = unzip [(entryDrawn entry x down, down) | (entry, (x, down)) <- zip entries places]
+  entryDrawn (draw, word) x down = [draw x (73 + down), textAt "q" (x + 32) (84 + down) [("", word)]]
+  places = scanl after (left, 0) (zip entries (drop 1 entries))
   -- Where the next one is.
   after (x, down) (entry, next)
     | x' + wide next <= right = (x', down)
@@ -41,15 +43,30 @@ legend left right used = (group "le" (concat drawn), maximum (0 : downs))
   entries =
     concatMap
       (map snd . filter fst)
-      [ map outcome [(Success, "succeeded"), (RanAgain, "succeeded, but ran again"), (CutShort, "ended by a signal"), (Failure, "failed"), (Fault, "faulted"), (Stop, "stopped")]
+      [ map
+          outcome
+          [ (Success, "succeeded")
+          , (RanAgain, "succeeded, but ran again")
+          , (CutShort, "ended by a signal")
+          , (Failure, "failed")
+          , (Fault, "faulted")
+          , (Stop, "stopped")
+          ]
       , [(usedStopping used, (\x y -> shape "h" (barShape Stop x y 26 13), "while stopping"))]
       , [outcome (Running, "not ended")]
-      , [(usedPauses used, (\x y -> shape "wt" (Text.concat ["M", px (x + 2), " ", px (y + 6.5), "H", px (x + 25)]), "waiting, or unnamed"))]
+      , [(usedPauses used, (pauseSample, "waiting, or unnamed"))]
       , [(e `elem` usedChanges used, (\x y -> arrowSample e x (y + 6.5), word)) | (e, word) <- changes]
       , [(usedMerged used, (several, "short spans, together"))]
       ]
   changes = [(Interrupts, "a signal changed → stopped → started"), (OnlyStarts, "a signal changed → started")]
+  pauseSample x y = shape "wt" (Text.concat ["M", px (x + 2), " ", px (y + 6.5), "H", px (x + 25)])
   outcome (o, word) =
-    (o `elem` usedOutcomes used, (\x y -> path (Text.unwords ["b", outcomeClass o]) (barShape o x y 26 13) mempty, word))
+    ( o `elem` usedOutcomes used
+    , (\x y -> path (Text.unwords ["b", outcomeClass o]) (barShape o x y 26 13) mempty, word)
+    )
   several x y =
-    group "" (shape "m v2 s" (markShape Success x y 26 13) : [shape "m f" (markShape Failure (x + 8) y 2 13) | Failure `elem` usedOutcomes used])
+    group
+      ""
+      ( shape "m v2 s" (markShape Success x y 26 13)
+          : [shape "m f" (markShape Failure (x + 8) y 2 13) | Failure `elem` usedOutcomes used]
+      )

@@ -51,7 +51,13 @@ ranAgain :: Recording -> IntSet.IntSet
 ranAgain r = IntSet.fromList (foldr (found Nothing) [] (roots r))
  where
   found :: Maybe Seconds -> Node -> [Int] -> [Int]
-  found lostAt n rest = [spanNumber s | Just (_, Succeeded) <- [nodeEnd n], Just t <- [lostAt], maybe False (>= t) (Map.lookup (spanName s) lastBegin)] ++ inner
+  found lostAt n rest =
+    [ spanNumber s
+    | Just (_, Succeeded) <- [nodeEnd n]
+    , Just t <- [lostAt]
+    , maybe False (>= t) (Map.lookup (spanName s) lastBegin)
+    ]
+      ++ inner
    where
     s = nodeSpan n
     inner = foldr (found (earliest lostAt (lostBy n))) rest (nodeChildren n)

@@ -38,7 +38,11 @@ pauses x r placed = take 300 (concatMap inSpan placed)
  where
   inSpan p
     | placedBelow p || placedLane p + 1 >= maxLanes || null inner = []
-    | otherwise = [Pause (placedLane p + 1) (x a) (x b) (b - a) by | (a, b, by) <- concatMap (cut waits) (filter isWide (between begin inner end)), isWide (a, b)]
+    | otherwise =
+        [ Pause (placedLane p + 1) (x a) (x b) (b - a) by
+        | (a, b, by) <- concatMap (cut waits) (filter isWide (between begin inner end))
+        , isWide (a, b)
+        ]
    where
     isWide (a, b) = x b - x a >= 14
     n = placedNode p
@@ -65,15 +69,18 @@ pauses x r placed = take 300 (concatMap inSpan placed)
       , Nothing <- [reactionStopped a]
       ]
 
--- | A line between those pixels, with a text in it if there is room for one. The upper edge of its lane is there, and a bar has
--- that height.
+-- | A line between those pixels, with a text in it if there is room for one. The upper edge of its lane is there, and
+-- a bar has that height.
 pauseDrawn :: (Double, Double) -> Double -> Double -> Pause -> [Element]
 pauseDrawn (a, b) top h p = case filter ((<= b - a - 16) . wide) texts of
-  text : _ | half <- wide text / 2 + 3 -> [line a (middle - half), textAt "n q c" middle (top + h / 2 + 4) [("", text)], line (middle + half) b]
+  text : _
+    | half <- wide text / 2 + 3 ->
+        [line a (middle - half), textAt "n q c" middle (top + h / 2 + 4) [("", text)], line (middle + half) b]
   [] -> [line a b]
  where
   middle = (a + b) / 2
-  line left right = path "wt" (Text.concat ["M", px (left + 4), " ", px (top + h / 2), "H", px (max (left + 4) (right - 4))]) (titled (take 1 texts))
+  line left right = path "wt" (Text.concat (stroke left right)) (titled (take 1 texts))
+  stroke left right = ["M", px (left + 4), " ", px (top + h / 2), "H", px (max (left + 4) (right - 4))]
   wide text = textWidth text * 11 / 12
   texts = pauseTexts p
 

@@ -47,7 +47,9 @@ rowsFor left right most names markers = map final chosen
  where
   -- The longest texts with which as many as possible have one; if possible, texts that say equally much.
   chosen = chosenFrom True (snd (head (sortOn fst [(without (chosenFrom False known), known) | known <- lengths])))
-  lengths = [\m -> if isAtEdge m then texts m else take 1 (drop k (texts m)) | k <- [0 .. 2]] ++ [texts, drop 1 . texts, shortest]
+  lengths =
+    [\m -> if isAtEdge m then texts m else take 1 (drop k (texts m)) | k <- [0 .. 2]]
+      ++ [texts, drop 1 . texts, shortest]
   shortest = take 1 . reverse . texts
   without = length . filter (isNothing . snd . snd)
   final (_, (_, Nothing)) = (1 + maximum (-1 : [row | (_, (row, Just _)) <- chosen]), Nothing)
@@ -55,9 +57,12 @@ rowsFor left right most names markers = map final chosen
   chosenFrom :: Bool -> (Marker -> [[Part]]) -> [(Marker, Row)]
   chosenFrom crossing ofMarker = reverse (foldl choose [] markers)
    where
-    choose done m = (m, fromMaybe (-1, Nothing) (listToMaybe (mapMaybe (fits False done m) options ++ mapMaybe (fits True done m) (if crossing then crossed else [])))) : done
+    choose done m = (m, fromMaybe (-1, Nothing) (listToMaybe fitting)) : done
      where
-      options = [(row, l) | l <- candidates (ofMarker m) m ++ (if crossing then cut (ofMarker m) m else []), row <- [0 .. most - 1]]
+      fitting = mapMaybe (fits False done m) options ++ crossings
+      crossings = mapMaybe (fits True done m) (if crossing then crossed else [])
+      options = [(row, l) | l <- candidates (ofMarker m) m ++ shortened, row <- [0 .. most - 1]]
+      shortened = if crossing then cut (ofMarker m) m else []
       crossed = [(row, l) | l <- candidates (shortest m) m, row <- [0 .. most - 1]]
   -- Better an arrow behind a label than no label.
   fits crossed done m (row, l@(at, w, _))
@@ -84,9 +89,12 @@ rowsFor left right most names markers = map final chosen
     | room <- right - markerX m - 24, room > 90 = [(markerX m + 12, room, [("k", fitted (room / 1.12) (snd part))])]
   cut _ _ = []
   texts m = case markerReactions m of
-    [r] -> [[("k", changed), ("q", what)] | (changed, what) <- variants r, not (null what)] ++ [[("k", known)] | known <- [values r, briefly r]]
+    [r] ->
+      [[("k", changed), ("q", what)] | (changed, what) <- variants r, not (null what)]
+        ++ [[("k", known)] | known <- [values r, briefly r]]
     several
-      | null (drop 40 markers), (r : others) <- interruptionsFirst several -> [[("k", known), ("q", "and " ++ changesOf others)] | known <- [values r, briefly r]]
+      | null (drop 40 markers), (r : others) <- interruptionsFirst several ->
+          [[("k", known), ("q", "and " ++ changesOf others)] | known <- [values r, briefly r]]
       | otherwise -> []
   variants r =
     [ (values r, inertUpTo 160 (long r))
@@ -96,7 +104,8 @@ rowsFor left right most names markers = map final chosen
     , (briefly r, inertUpTo 80 (arrows (startsText (snd (names r)) r)))
     ]
   interruptionsFirst = uncurry (++) . partition (isJust . reactionStopped)
-  values r = inertUpTo 120 (intercalate " → " (fst (partsOf r {reactionChanges = map withoutOpposite (changedOnly (reactionChanges r))})))
+  values r = inertUpTo 120 (intercalate " → " (fst (partsOf r {reactionChanges = shownChanges r})))
+  shownChanges r = map withoutOpposite (changedOnly (reactionChanges r))
   -- (What a condition was before follows from what it is.)
   withoutOpposite c = if changeAfter c `elem` ["True", "False"] then c {changeBefore = Nothing} else c
   -- Without the values before.
@@ -108,6 +117,9 @@ rowsFor left right most names markers = map final chosen
 
 -- | How many of them interrupted something, and how many only started something.
 changesOf :: [Reaction] -> String
-changesOf rs = intercalate ", " [some n what | (n, what) <- [(interruptions, "interruption"), (length rs - interruptions, "start")], n > 0]
+changesOf rs =
+  intercalate
+    ", "
+    [some n what | (n, what) <- [(interruptions, "interruption"), (length rs - interruptions, "start")], n > 0]
  where
   interruptions = length (filter (isJust . reactionStopped) rs)

@@ -20,13 +20,22 @@ style =
     , ".bt .r{stroke-dasharray:4 3}.bt .e{text-anchor:end}.bt .c{text-anchor:middle}"
     , ".bt .l text,.bt .il text{paint-order:stroke;stroke-width:3px;stroke-linejoin:round}"
     , ".bt .k{font-weight:600}.bt .n{font-size:11px}.bt .z{font-size:10px}.bt .io{stroke-width:1.8}"
-    , colours ["#fcfcfa", "#e7e7e2", "#23262b", "#666b73", "#d3e6dd", "#7fb09c", "#f9d9c9", "#d4622a", "#f2bda2", "#f4c0d0", "#8c1d4b", "#c7527f", "#e4def6", "#8468cc", "#dfeaf7", "#5088c0", "#5a2fc2"]
+    , colours
+        [ "#fcfcfa", "#e7e7e2", "#23262b", "#666b73", "#d3e6dd", "#7fb09c", "#f9d9c9", "#d4622a", "#f2bda2"
+        , "#f4c0d0", "#8c1d4b", "#c7527f", "#e4def6", "#8468cc", "#dfeaf7", "#5088c0", "#5a2fc2"
+        ]
     , "@media(prefers-color-scheme:dark){"
-    , colours ["#15171b", "#2a2d33", "#e8e8e4", "#9ba1ab", "#24443a", "#4f8a76", "#57301d", "#f08a55", "#7a452a", "#571b35", "#f283ab", "#95325d", "#372d5e", "#a58df0", "#1d3450", "#6aa5e0", "#c3aeff"]
+    , colours
+        [ "#15171b", "#2a2d33", "#e8e8e4", "#9ba1ab", "#24443a", "#4f8a76", "#57301d", "#f08a55", "#7a452a"
+        , "#571b35", "#f283ab", "#95325d", "#372d5e", "#a58df0", "#1d3450", "#6aa5e0", "#c3aeff"
+        ]
     , "}"
     ]
  where
-  colours [ground, grid, ink, muted, ok, okEdge, bad, badEdge, badHatch, fault, faultEdge, faultHatch, stop, stopEdge, run, runEdge, arrow] =
+  colours
+    [ ground, grid, ink, muted, ok, okEdge, bad, badEdge, badHatch
+    , fault, faultEdge, faultHatch, stop, stopEdge, run, runEdge, arrow
+    ] =
     Text.concat
       [ rule ".g" "fill" ground
       , rule ".gl" "stroke" grid

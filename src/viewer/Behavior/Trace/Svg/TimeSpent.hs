@@ -28,7 +28,8 @@ data Taken = Taken String Seconds [Node]
 --
 -- Where several with parts run side by side, these are the times of their parts, and the whole is the sum.
 whereTimeWent :: Double -> Recording -> [Part]
-whereTimeWent width r = ("q", lead) : last (fallback' : take 1 (filter ((<= width) . partsWidth . (("q", lead) :)) texts))
+whereTimeWent width r =
+  ("q", lead) : last (fallback' : take 1 (filter ((<= width) . partsWidth . (("q", lead) :)) texts))
  where
   (taken, total, sideBySide) = maybe (mostOf r, until r - from r, 0) (\(t, whole, n) -> (t, whole, n)) (sideBySideOf r)
   lead = case listed of
@@ -36,14 +37,22 @@ whereTimeWent width r = ("q", lead) : last (fallback' : take 1 (filter ((<= widt
     Taken _ t _ : _ : _ | t < 0.2 * total -> "spread over " ++ some (length listed) "part" ++ ", the longest:"
     _ -> "most of the time:"
   fallback' = last ([("", "nothing took time")] : texts)
-  texts = [shown k (rest k) | not (null listed), rest <- [namesFrom, countFrom], k <- reverse [1 .. min 4 (length listed)]]
+  texts =
+    [ shown k (rest k)
+    | not (null listed)
+    , rest <- [namesFrom, countFrom]
+    , k <- reverse [1 .. min 4 (length listed)]
+    ]
   shown k rest = commas (concatMap entry (take k listed)) ++ [("", "and " ++ rest) | not (null rest)]
   namesFrom k = intercalate ", " [inertUpTo 40 name | Taken name _ _ <- drop k listed]
   countFrom k = if null (drop k listed) then "" else some (length listed - k) "other"
   listed = case span (\(Taken _ t _) -> t >= 0.01 * total) (inSeries taken) of
     ([], rest) -> take 1 rest
     (seen, _) -> seen
-  entry (Taken name t same) = [("k", inertUpTo 40 name ++ ":"), ("", secondsText t ++ remarks (share t ++ [times n | let n = length same, n > 1, sideBySide == 0]))]
+  entry (Taken name t same) =
+    [ ("k", inertUpTo 40 name ++ ":")
+    , ("", secondsText t ++ remarks (share t ++ [times n | let n = length same, n > 1, sideBySide == 0]))
+    ]
   remarks known = if null known then "" else " (" ++ intercalate ", " known ++ ")"
   share t =
     [ if percent < 0.5 then "under 1 %" else show (round percent :: Int) ++ " %"
@@ -66,10 +75,16 @@ times n = show n ++ " times"
 inSeries :: [Taken] -> [Taken]
 inSeries taken
   | null (drop 4 taken) = taken
-  | otherwise = mostFirst (map one (Map.toList (Map.fromListWith (++) [(numbered name, [t]) | t@(Taken name _ _) <- reverse taken])))
+  | otherwise =
+      mostFirst
+        (map one (Map.toList (Map.fromListWith (++) [(numbered name, [t]) | t@(Taken name _ _) <- reverse taken])))
  where
   one (_, [single]) = single
-  one ((name, _), several) = Taken (name ++ range [n | Taken n _ _ <- several]) (sum [t | Taken _ t _ <- several]) (concat [same | Taken _ _ same <- several])
+  one ((name, _), several) =
+    Taken
+      (name ++ range [n | Taken n _ _ <- several])
+      (sum [t | Taken _ t _ <- several])
+      (concat [same | Taken _ _ same <- several])
   numbered name = let series = dropWhileEnd isDigit name in (series, series /= name)
   range names = case sortOn (\n -> (length n, n)) (map (reverse . takeWhile isDigit . reverse) names) of
     numbers@(first : _ : _) -> first ++ "–" ++ last numbers
@@ -89,7 +104,8 @@ sideBySideOf r = level (roots r)
    where
     withParts = filter (not . null . nodeChildren) ns
     whole = sum (map took withParts)
-    known = [Taken name t same | (name, (t, same)) <- Map.toList (Map.fromListWith plus [(name, (t, same)) | n <- withParts, Taken name t same <- byName r (nodeChildren n)])]
+    known = [Taken name t same | (name, (t, same)) <- Map.toList (Map.fromListWith plus parts)]
+    parts = [(name, (t, same)) | n <- withParts, Taken name t same <- byName r (nodeChildren n)]
     plus (t, a) (u, b) = (t + u, b ++ a)
     rest = Taken unnamed (whole - sum [covered r (nodeChildren n) | n <- withParts]) []
   took n = nodeUntil r n - spanBegan (nodeSpan n)
@@ -100,7 +116,8 @@ mostOf :: Recording -> [Taken]
 mostOf r = level [] (roots r)
  where
   level itself ns
-    | [Taken _ t same] <- filter dominates (byName r ns) = level [Taken unnamed (t - covered r (inner same)) []] (inner same)
+    | [Taken _ t same] <- filter dominates (byName r ns) =
+        level [Taken unnamed (t - covered r (inner same)) []] (inner same)
     | sumOf here < total / 2, not (null (inner ns)), sumOf deeper > sumOf here = deeper
     | otherwise = here
    where

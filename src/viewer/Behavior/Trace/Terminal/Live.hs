@@ -121,7 +121,12 @@ watch live event = case event of
   Reacted r
     | Just _ <- reactionStopped r ->
         (at (reactionTime r))
-          { liveInterruption = Just $! Interruption (clipReaction r) (map nameAndBegin (IntMap.findWithDefault [] (reactionNumber r) (liveStopped live))) Nothing
+          { liveInterruption =
+              Just
+                $! Interruption
+                  (clipReaction r)
+                  (map nameAndBegin (IntMap.findWithDefault [] (reactionNumber r) (liveStopped live)))
+                  Nothing
           , liveStopped = IntMap.delete (reactionNumber r) (liveStopped live)
           }
     | otherwise -> at (reactionTime r)
@@ -133,7 +138,10 @@ watch live event = case event of
 -- The first named span that the last interruption started.
 begun :: IntMap Active -> Span -> Interruption -> Interruption
 begun active s i
-  | Nothing <- startedSpan i, spanKind s == Named, take 1 startedBy == [reactionNumber (interruptedBy i)] = i {startedSpan = Just $! clip (spanName s)}
+  | Nothing <- startedSpan i
+  , spanKind s == Named
+  , take 1 startedBy == [reactionNumber (interruptedBy i)] =
+      i {startedSpan = Just $! clip (spanName s)}
   | otherwise = i
  where
   -- In a detailed trace the branch was started by it.
@@ -143,7 +151,8 @@ ended :: Span -> Seconds -> End -> Live -> Live
 ended s t end live = case spanParent s of
   Inside p
     | Just a <- IntMap.lookup p others ->
-        after {liveActive = IntMap.insert p (a {activeDone = latest (activeDone a), activeDoneCount = activeDoneCount a + 1}) others}
+        let more = a {activeDone = latest (activeDone a), activeDoneCount = activeDoneCount a + 1}
+         in after {liveActive = IntMap.insert p more others}
   _ -> after {liveActive = others, liveDone = latest (liveDone live), liveDoneCount = liveDoneCount live + 1}
  where
   number = spanNumber s
@@ -165,10 +174,16 @@ ended s t end live = case spanParent s of
       }
   after = noted {liveStopped = stoppedToo}
   stoppedToo
-    | StoppedBy (SignalChanged n _) <- end, spanKind s == Named = lastOnes (IntMap.alter (Just . outermost) n (liveStopped live))
+    | StoppedBy (SignalChanged n _) <- end
+    , spanKind s == Named =
+        lastOnes (IntMap.alter (Just . outermost) n (liveStopped live))
     | otherwise = liveStopped live
   outermost known =
-    keep maxStopped (Stopped (spanName s) (spanBegan s) (keep maxPath (map spanNumber (ancestors (liveActive live) s))) : filter (notElem number . stoppedIn) (concat known))
+    keep
+      maxStopped
+      ( Stopped (spanName s) (spanBegan s) (keep maxPath (map spanNumber (ancestors (liveActive live) s)))
+          : filter (notElem number . stoppedIn) (concat known)
+      )
   -- The reactions of some may be lost.
   lastOnes known = if IntMap.size known > maxReactions then IntMap.deleteMin known else known
   noted
@@ -262,4 +277,6 @@ clipReaction r =
     Just name -> Just $! clip name
   stopped = case reactionStopped r of
     Nothing -> Nothing
-    Just b | name <- clip (stoppedName b) -> Just $! (name `seq` b {stoppedName = name, stoppedEnd = clipEnd (stoppedEnd b)})
+    Just b
+      | name <- clip (stoppedName b) ->
+          Just $! (name `seq` b {stoppedName = name, stoppedEnd = clipEnd (stoppedEnd b)})

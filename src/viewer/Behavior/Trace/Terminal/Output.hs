@@ -22,15 +22,26 @@ import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
 import Data.Maybe (isJust)
 import System.IO (Handle, hClose, hFlush, hIsOpen, stderr, stdout)
 import System.Posix.Files (deviceID, fileID, getFdStatus)
-import System.Posix.IO (FdOption (CloseOnExec), closeFd, createPipe, dup, dupTo, fdToHandle, setFdOption, stdError, stdOutput)
+import System.Posix.IO
+  ( FdOption (CloseOnExec)
+  , closeFd
+  , createPipe
+  , dup
+  , dupTo
+  , fdToHandle
+  , setFdOption
+  , stdError
+  , stdOutput
+  )
 import System.Posix.Terminal (queryTerminal)
 import System.Posix.Types (DeviceID, Fd, FileID)
 import System.Timeout (timeout)
 
 -- | Runs the action. What the process writes to its standard output and its standard error meanwhile, as far as these
--- are terminals, goes to the function: in pieces, in order, from one thread. So it is for every handle of these descriptors,
--- for foreign code, and for processes that it starts; each of them sees a pipe in place of a terminal. Everything that was
--- written has gone to the function when this returns; except what a process writes that outlives the action.
+-- are terminals, goes to the function: in pieces, in order, from one thread. So it is for every handle of these
+-- descriptors, for foreign code, and for processes that it starts; each of them sees a pipe in place of a terminal.
+-- Everything that was written has gone to the function when this returns; except what a process writes that outlives
+-- the action.
 --
 -- If the function does not return, a writer waits when the pipe is full, as it does for a terminal that does not go on.
 --
@@ -50,10 +61,11 @@ withOutputTo receive act
         Left e -> let _ = e :: IOException in restore act
   | otherwise = act
  where
-  flushed = for_ [stdout, stderr] $ \h -> void (try (hIsOpen h >>= \open -> if open then hFlush h else pure ()) :: IO (Either IOException ()))
+  flushed = for_ [stdout, stderr] $ \h ->
+    void (try (hIsOpen h >>= \open -> if open then hFlush h else pure ()) :: IO (Either IOException ()))
 
--- Until all have closed the other end. (Whatever happens, it is read: otherwise those who print would wait for ever.) It
--- counts two steps for each piece: so the number is odd while the function receives one.
+-- Until all have closed the other end. (Whatever happens, it is read: otherwise those who print would wait for ever.)
+-- It counts two steps for each piece: so the number is odd while the function receives one.
 relay :: (Bytes.ByteString -> IO ()) -> IORef Int -> Handle -> IO ()
 relay receive steps readEnd = do
   piece <- Bytes.hGetSome readEnd 65536

@@ -15,7 +15,14 @@ module Behavior.Trace.Terminal.Screen
   ) where
 
 import Data.Char (GeneralCategory (..), generalCategory)
-import System.Console.ANSI (Color (..), ColorIntensity (..), ConsoleIntensity (..), ConsoleLayer (..), SGR (..), setSGRCode)
+import System.Console.ANSI
+  ( Color (..)
+  , ColorIntensity (..)
+  , ConsoleIntensity (..)
+  , ConsoleLayer (..)
+  , SGR (..)
+  , setSGRCode
+  )
 
 -- | A line: texts, each in a colour.
 --

@@ -37,7 +37,9 @@ fitting :: Int -> [Ranked] -> [Line]
 fitting rows ranked
   | missing <= 0 = map snd ranked
   | rows <= 0 = []
-  | otherwise = [line | (k, (_, line)) <- numbered, IntMap.member k chosen] ++ [[(Muted, "… " ++ show (missing + 1) ++ " more")]]
+  | otherwise =
+      [line | (k, (_, line)) <- numbered, IntMap.member k chosen]
+        ++ [[(Muted, "… " ++ show (missing + 1) ++ " more")]]
  where
   missing = length ranked - rows
   numbered = zip [0 ..] ranked
@@ -106,13 +108,17 @@ interruptionLines width time live = case liveInterruption live of
     , [(Normal, "  " ++ intercalate " -> " done)]
     ]
    where
-    (changed, done) = reactionParts (map (first short) (reverse (interruptedSpans i))) (short <$> startedSpan i) (interruptedBy i)
+    (changed, done) =
+      reactionParts (map (first short) (reverse (interruptedSpans i))) (short <$> startedSpan i) (interruptedBy i)
  where
   short = cutTo (max 8 (width `div` 3))
 
 failedLine :: Seconds -> Failed -> Line
 failedLine time f = case map snd (failedPath f) of
-  name : outer -> [(Bad, "✗ " ++ nameText name ++ ": " ++ howText (failedHow f)), (Muted, place outer ++ ", " ++ ago time (failedAt f))]
+  name : outer ->
+    [ (Bad, "✗ " ++ nameText name ++ ": " ++ howText (failedHow f))
+    , (Muted, place outer ++ ", " ++ ago time (failedAt f))
+    ]
   [] -> []
  where
   place [] = ""
