@@ -9,7 +9,7 @@ module Behavior.RunBehaviorSpec (spec) where
 import Control.Concurrent
 import Control.Concurrent.Async (asyncThreadId, poll, wait, waitCatchSTM, withAsyncBound)
 import Control.Exception
-import Control.Monad (join, replicateM, replicateM_, unless, void, when)
+import Control.Monad (forever, join, replicateM, replicateM_, unless, void, when)
 import Data.Either (fromLeft)
 import Data.Foldable (for_)
 import Data.Maybe (isNothing)
@@ -87,6 +87,12 @@ spec = guarded . describe "runBehavior" $ do
             >> runBehavior (uninterruptibly (raiseSignal signal >> hang) (installed sigHUP >>= replicateM_ 2))
         )
         >>= (`shouldBe` Exited (ExitFailure code))
+
+    it ("does not end the process at a SIGHUP soon after a " ++ name ++ ": its caller cleans up") $ do
+      let hangups = installed sigHUP >>= replicateM_ 2
+          cleanup = hangups >> runBehavior (pure ()) >> hangups >> throwIO (ExitFailure 7)
+      inChild (byDefault sigHUP >> (runBehavior (raiseSignal signal >> hang) `finally` cleanup))
+        >>= (`shouldBe` Exited (ExitFailure 7))
 
     it ("ends the process at once at a signal of the other kind after a " ++ name) $
       inChild (runBehavior (uninterruptibly (raiseSignal signal >> hang) (raiseSignal otherSignal >> hang)))
@@ -188,6 +194,10 @@ spec = guarded . describe "runBehavior" $ do
       run (installHandler sigHUP Ignore Nothing) >>= \case
         Ignore -> pure ()
         _ -> expectationFailure "a handler is installed"
+
+  it "begins in a process that is forked while, in other threads, behaviours begin and end" $
+    withThread (forever (runBehavior (pure ()))) $ \_ -> withThread (forever (runBehavior (pure ()))) $ \_ ->
+      replicateM_ 50 $ inChild (runBehavior (pure ())) >>= (`shouldBe` Exited ExitSuccess)
 
   it "ends the process at a second SIGTERM while a loop that never allocates runs, and prints why" $ do
     -- Sometimes another thread runs before the loop begins, and answers the first signal.

@@ -22,8 +22,10 @@
 --     Then the second signal ends the process (in @signals.c@).
 --
 -- Two things are special about SIGHUP. Where it is ignored when the first run begins (by nohup),
--- it stays ignored. And a second one has no effect: when a terminal is closed, the shell and the
--- kernel send one each.
+-- it stays ignored. And when a terminal is closed, the shell and the kernel send one each: at the
+-- same time, or as far apart as the shell's exit trap takes. So a SIGHUP has no effect while runs are
+-- being stopped; and for ten seconds after the signal that stopped them it does not end the process,
+-- because the caller of the last one may still clean up.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.ProcessSignals
@@ -41,11 +43,13 @@ import Control.Concurrent.MVar (MVar, modifyMVar, modifyMVar_, newMVar)
 import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Concurrent.STM.TVar (mkWeakTVar)
 import Control.Exception (bracket, uninterruptibleMask_)
-import Control.Monad (filterM, void, (>=>))
+import Control.Monad (filterM, unless, void)
 import Data.Foldable (for_)
+import Data.IORef (IORef, atomicModifyIORef', newIORef)
 import Data.Maybe (catMaybes)
 import Data.Traversable (for)
 import Foreign.C (CInt (..))
+import GHC.Clock (getMonotonicTime)
 import System.IO.Unsafe (unsafePerformIO)
 import System.Mem.StableName (eqStableName, makeStableName)
 import System.Mem.Weak (Weak, deRefWeak)
@@ -83,23 +87,25 @@ data Process = Process
   -- ^ The signal that the runs have received, unless one of them has taken it.
   , defaulted :: Bool
   -- ^ Whether the first signal has come: the next SIGINT or SIGTERM ends the process at once.
-  , owner :: Maybe ProcessID
-  -- ^ The process that these runs belong to.
+  , noHangupUntil :: Double
+  -- ^ Until then, in seconds of the monotonic clock, a SIGHUP does not end the process.
   }
 
-process :: MVar Process
-process = unsafePerformIO (newMVar nothingRuns)
-{-# NOINLINE process #-}
-
 nothingRuns :: Process
-nothingRuns = Process {runs = [], before = [], pending = Nothing, defaulted = False, owner = Nothing}
+nothingRuns = Process {runs = [], before = [], pending = Nothing, defaulted = False, noHangupUntil = 0}
 
--- | The state for the current process. (A process made by @forkProcess@ has none of the runs of
--- the original process.)
-here :: Process -> IO Process
-here known = do
+-- | The state of the current process. (A process made by @forkProcess@ has none of the runs of the
+-- original process. And there the original's state may be locked for ever: by a thread that was not copied.)
+process :: IO (MVar Process)
+process = do
   self <- getProcessID
-  pure (if owner known == Just self then known else nothingRuns {owner = Just self})
+  new <- newMVar nothingRuns
+  atomicModifyIORef' owned $ \known@(owner, state) -> if owner == self then (known, state) else ((self, new), new)
+
+-- | The process that was the current one, and its state.
+owned :: IORef (ProcessID, MVar Process)
+owned = unsafePerformIO (newMVar nothingRuns >>= newIORef . (,) 0)
+{-# NOINLINE owned #-}
 
 -- | Begins a run. (A run that begins while others are being stopped belongs to a cleanup; the
 -- second signal ends it with them.)
@@ -107,7 +113,8 @@ enter :: IO (Int, TVar State)
 enter = do
   state <- newTVarIO NoSignal
   weakly <- mkWeakTVar state (pure ())
-  modifyMVar process $ here >=> \known -> do
+  current <- process
+  modifyMVar current $ \known -> do
     installed <- if null (runs known) then install known else pure known
     let n = 1 + maximum (0 : map fst (runs installed))
     pure (installed {runs = (n, weakly) : runs installed}, (n, state))
@@ -124,46 +131,51 @@ enter = do
 
 -- | Ends a run.
 leave :: (Int, TVar State) -> IO ()
-leave (n, state) = uninterruptibleMask_ . modifyMVar_ process $ \known -> do
-  end <- readTVarIO state
-  let left =
-        known
-          { runs = filter ((/= n) . fst) (runs known)
-          , pending = if end == Taken then Nothing else pending known
-          }
-  if null (runs left) then nothingRuns <$ restore left else pure left
+leave (n, state) = uninterruptibleMask_ $ do
+  current <- process
+  modifyMVar_ current $ \known -> do
+    end <- readTVarIO state
+    let others = filter ((/= n) . fst) (runs known)
+        left = known {runs = others, pending = if end == Taken then Nothing else pending known}
+    if null (runs left) then restore left else pure left
  where
   restore left = do
     for_ (before left) $ \case
       (_, Default) -> pure ()
       (signal, handler) -> void (installHandler signal handler Nothing)
     for_ (pending left) raiseSignal
+    pure nothingRuns {noHangupUntil = maybe (noHangupUntil left) (const 0) (pending left)}
 
 -- | The handler of a signal.
 received :: Signal -> IO ()
-received signal = uninterruptibleMask_ . (answer >>) . modifyMVar_ process $ here >=> \known -> do
-  there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
-  case there of
-    -- (B)
-    [] -> known <$ passOn signal
-    _
-      -- It is a SIGHUP, or came together with the first one, before the default was installed.
-      | defaulted known -> pure known
-      | otherwise -> do
-          atomically (for_ there (`writeTVar` Received signal))
-          for_ [sigINT, sigTERM] $ \each -> installHandler each Default Nothing
-          pure known {pending = Just signal, defaulted = True}
+received signal = uninterruptibleMask_ $ do
+  answer
+  current <- process
+  t <- getMonotonicTime
+  modifyMVar_ current $ \known -> do
+    there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
+    case there of
+      -- (B)
+      [] -> known <$ passOn (signal == sigHUP && t < noHangupUntil known) signal
+      _
+        -- It is a SIGHUP, or came together with the first one, before the default was installed.
+        | defaulted known -> pure known
+        | otherwise -> do
+            atomically (for_ there (`writeTVar` Received signal))
+            for_ [sigINT, sigTERM] $ \each -> installHandler each Default Nothing
+            pure known {pending = Just signal, defaulted = True, noHangupUntil = t + 10}
 
 -- | Raises the signal for the handler that is installed; if that is ours, the default was
--- installed before.
-passOn :: Signal -> IO ()
-passOn signal = do
+-- installed before, and the process ends, unless it has been stopped just now.
+passOn :: Bool -> Signal -> IO ()
+passOn justStopped signal = do
   -- Reading a handler replaces it. With ours in its place no signal is lost meanwhile.
   for_ (lookup signal handlers) $ \ours -> do
     there <- installHandler signal ours Nothing
     stayed <- isOurs signal there
-    installHandler signal (if stayed then Default else there) Nothing
-  raiseSignal signal
+    unless (stayed && justStopped) $ do
+      _ <- installHandler signal (if stayed then Default else there) Nothing
+      raiseSignal signal
 
 -- | Whether the handler is the one that this module installs.
 isOurs :: Signal -> Handler -> IO Bool

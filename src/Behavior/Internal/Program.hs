@@ -24,8 +24,9 @@ import Behavior.Internal.Trace.Event (Cause (..))
 --   times as long: each thread switch would be a system call.
 -- * The first SIGINT (Ctrl-C), SIGTERM or SIGHUP (a terminal or ssh session was closed)
 --   cancels the behaviour. When that has ended, cleanup included, the process ends with 130,
---   143 or 129. A second SIGINT or SIGTERM ends it at once; a second SIGHUP does not, because
---   a terminal that is closed sends two. Where SIGHUP is ignored when the behaviour begins
+--   143 or 129. A second SIGINT or SIGTERM ends it at once; a SIGHUP does not, because two come when
+--   a terminal is closed: it has no effect until the behaviour has ended, and for ten seconds after the
+--   first signal it does not end the process. Where SIGHUP is ignored when the behaviour begins
 --   (@nohup@), it stays ignored. When its terminal was closed, printing throws an
 --   'System.IO.Error.IOError': a cleanup that prints before it stops the motors does not stop them.
 -- * While a loop that never allocates runs, GHC runs nothing else, and a signal has no effect. Then a
@@ -33,7 +34,7 @@ import Behavior.Internal.Trace.Event (Cause (..))
 --
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
 -- instead of the exit. A signal that comes too late to cancel the behaviour is raised
--- again, for the handler that was installed before: no signal is without effect. (After the
+-- again, for the handler that was installed before: no first signal is without effect. (After the
 -- behaviour, these signals have the effect that they had before it. If that was the
 -- default, a handler of this library does it, so 'System.Posix.Signals.installHandler'
 -- returns that handler.)
