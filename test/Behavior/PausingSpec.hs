@@ -10,11 +10,13 @@ import Control.Monad (void)
 import Data.Foldable (for_)
 import Data.IORef
 import Test.Hspec
+import Test.Hspec.QuickCheck (prop)
+import Test.QuickCheck (NonNegative (..), Positive (..), ioProperty, (===))
 
 import Behavior
 import Behavior.Signal (Signal, pausedWhile, stoppedWhile, teleoReactive)
 import Behavior.Sim (Plan, exhaustively, explain, explore, outcome, randomly, simulate)
-import Behavior.Time (atomically, checkpoint, now, sleepUntil, timeout)
+import Behavior.Time (atomically, checkpoint, now, sleepForever, sleepUntil, timeout)
 import Support
 import Watched
 
@@ -62,8 +64,8 @@ pauses = do
 
   it "stops the behaviour, and throws, when pausing or resuming fails or faults" $
     for_
-      [ (failWith "no", FailedWith "FailedBecause \"no\"")
-      , (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())
+      [ (failWith "no", failing)
+      , (throwIO (Fault "bug"), faulted)
       ]
       $ \(wrong, end) -> do
         let act record = sleep 9 `onException` record "stopped"
@@ -75,10 +77,78 @@ pauses = do
         other `shouldBe` [("pause", 1), ("stopped", 2), (show end, 2)]
 
   it "ignores a failure of resuming after the end of the behaviour, and throws a fault of it" $
-    for_ [(failWith "no", Gave ()), (throwIO (Fault "bug"), FaultedWith (show (Fault "bug")) :: Ending ())] $
+    for_ [(failWith "no", Gave ()), (throwIO (Fault "bug"), faulted)] $
       \(wrong, end) -> do
         told <- story [(1, True)] $ \condition record -> pausedWhile condition (record "pause") wrong (sleep 5)
         told `shouldBe` [("pause", 1), (show end, 5)]
+
+  it "resumes after a pause that swallows the request of its stop, or completes then" $ do
+    let slow :: (String -> Behavior ()) -> Behavior ()
+        slow record = (record "pause" >> sleep 9) `catch` \(_ :: SomeAsyncException) -> record "swallowed"
+    one <- story [(1, True), (2, False)] $ \condition record ->
+      pausedWhile condition (slow record) (record "resume") (sleep 5)
+    one `shouldBe` [("pause", 1), ("swallowed", 2), ("resume", 2), ("Gave ()", 5)]
+    other <- story [(1, True)] $ \condition record ->
+      pausedWhile condition (slow record) (record "resume") (sleep 5)
+    other `shouldBe` [("pause", 1), ("swallowed", 5), ("resume", 5), ("Gave ()", 5)]
+
+  it "throws what pausing has thrown, whatever resuming throws; a fault in any case" $ do
+    let bug = throwIO (Fault "bug")
+        ends pause resume changes = do
+          told <- story changes $ \condition record ->
+            pausedWhile condition pause (record "resume" >> resume) (sleep 5)
+          map fst told `shouldContain` ["resume"]
+          pure (last told)
+    ends bug (failWith "no") [(1, True)] `shouldReturn` (show faulted, 1)
+    ends (failWith "no") bug [(1, True)] `shouldReturn` (show faulted, 1)
+    ends (failWith "no") (failWith "nor that") [(1, True)] `shouldReturn` (show failing, 1)
+    -- In its cleanup: when it is no longer needed, and when the behaviour has ended.
+    ends (hang `onException` bug) (failWith "no") [(1, True), (2, False)] `shouldReturn` (show faulted, 2)
+    ends (hang `onException` bug) (failWith "no") [(1, True)] `shouldReturn` (show faulted, 5)
+    ends (hang `onException` failWith "no") (pure ()) [(1, True), (2, False)] `shouldReturn` (show failing, 2)
+    -- While it resumes, it would not be needed any more.
+    ends bug (sleep 1) [(1, True), (1.5, False)] `shouldReturn` (show faulted, 2)
+    ends (failWith "no") (sleep 1) [(1, True), (1.5, False)] `shouldReturn` (show failing, 2)
+
+  it "resumes to the end: nothing interrupts that" $ do
+    let resuming record = record "resume" >> sleep 1 >> record "resumed"
+    one <- story [(1, True), (1.5, False)] $ \condition record ->
+      pausedWhile condition (failWith "no") (resuming record) (sleep 5)
+    one `shouldBe` [("resume", 1), ("resumed", 2), (show failing, 2)]
+    other <- story [(1, True), (2, False), (2.25, True)] $ \condition record ->
+      timeout 2.5 (pausedWhile condition (record "pause") (resuming record) (sleep 9)) ? pure ()
+    other `shouldBe` [("pause", 1), ("resume", 2), ("resumed", 3), ("Gave ()", 3)]
+
+  it "gives the result of a behaviour that completes although the condition has died, or pausing has failed" $ do
+    let completing = ('a' <$ sleep 9) `catch` \(_ :: SomeAsyncException) -> pure 'a'
+        dying dead = do
+          condition <- newTestCondition False
+          ended <- newIORef Nothing
+          _ <- simulate $
+            both
+              (ending (pausedWhile (watched condition) (pure ()) (pure ()) completing) >>= writeIORef ended . Just)
+              (sleep 1 >> set condition dead)
+          readIORef ended
+    dying NoValue `shouldReturn` Just (Gave 'a')
+    dying SensorFailure `shouldReturn` Just (Gave 'a')
+    dying SensorFault `shouldReturn` Just (FaultedWith (show (Fault "the sensor")))
+    told <- story [(1, True)] $ \condition _ -> void (pausedWhile condition (failWith "no") (pure ()) completing)
+    told `shouldBe` [("Gave ()", 1)]
+
+  prop "is the behaviour beside stoppedWhile, while what pauses stops when it should" $
+    \(changes :: [Positive Int]) (Positive end) (NonNegative pausing) (NonNegative resuming) -> ioProperty $ do
+      -- (At different moments: with a tie the schedule decides, and the two have different ones.)
+      let times = scanl1 (+) [fromIntegral n | Positive n <- changes]
+          seconds base n = base + fromIntegral (n :: Int) / 3
+          happens pausing' = story (zip times (cycle [True, False])) $ \condition record ->
+            pausing'
+              condition
+              (record "pause" >> sleep (seconds 0.01 pausing) >> record "paused")
+              (record "resume" >> sleep (seconds 0.003 resuming) >> record "resumed")
+              (sleep (seconds 0.5 end) >> record "end")
+      (===)
+        <$> happens pausedWhile
+        <*> happens (\c pause resume act -> act ||| stoppedWhile (not <$> c) ((pause >> sleepForever) `finally` resume))
 
   it "stops the behaviour when the condition fails, faults or has no value any more" $
     for_ [SensorFailure, SensorFault, NoValue] $ \dead -> do
@@ -101,6 +171,10 @@ pauses = do
         let nears = atomically (writeTVar near True)
         _ <- simulate' (pausedWhile (watchedVar near) (become True >> checkpoint) (become False) nears)
         readTVarIO paused `shouldReturn` False
+
+failing, faulted :: Ending ()
+failing = FailedWith "FailedBecause \"no\""
+faulted = FaultedWith (show (Fault "bug"))
 
 stops :: Spec
 stops = do

@@ -10,16 +10,18 @@ module Behavior.Internal.Reactive.Pausing
   , stoppedWhile
   ) where
 
-import Control.Concurrent.STM (check, newTVarIO, orElse, readTVar, writeTVar)
-import Control.Exception (finally)
+import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
+import Control.Exception (mask_, throwIO, try, uninterruptibleMask_)
 import Control.Monad (unless)
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine
 import Behavior.Internal.Repeating (sleepForever)
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Runtime (Label (..), awaitUninterruptibly)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
+import Behavior.Internal.Stop (causeOf)
+import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior
@@ -31,22 +33,24 @@ import Behavior.Internal.Signal.Source
 -- and goes on where it was.
 --
 -- > pausedWhile (pure False) pause resume act  =  act
--- > pausedWhile c pause resume act  ~  act ||| switch c (\holds -> when holds (pause >> sleepForever) `finally` resume)
+-- > pausedWhile c pause resume act  =  act ||| stoppedWhile (not \<$> c) ((pause >> sleepForever) `finally` resume)
+-- >   -- if c is false at first, act has no result, pause stops when it should, and nothing throws
 --
 -- The condition is read before anything starts, and while it holds, @act@ does not begin. Later, whenever
 -- it becomes true, @pause@ runs beside @act@; and when it has become false again, @resume@. What
 -- cannot be paused, is stopped and begins again: 'stoppedWhile'.
 --
 -- That @resume@ runs is certain once @pause@ has begun, whatever happens: if @act@ ends meanwhile, if
--- the caller is cancelled, if @pause@ itself fails, or is no longer needed before it has ended (it is then
--- stopped, perhaps before it had an effect: to resume what is not paused must do no harm). It runs as a
--- cleanup does, with 'finally': if it takes time, limit it (@'Behavior.Time.cleanupWithin' 1 resume@). Of
--- @pause@ and @resume@ never two run at once.
+-- the caller is cancelled, if @pause@ itself fails or completes late, or is no longer needed before it has
+-- ended (it is then stopped, perhaps before it had an effect: to resume what is not paused must do no
+-- harm). Nothing interrupts @resume@, and everything waits for it: if it takes time, limit it
+-- (@'Behavior.Time.timeout' 1 resume@). Of @pause@ and @resume@ never two run at once.
 --
--- [Result] That of @act@.
--- [Failure] Of @act@, @pause@ or @resume@, or of the condition: @act@ is stopped, and it is thrown. A
---   failure of @resume@ after the end of @act@ is ignored.
--- [Fault] Likewise, and none is ignored.
+-- [Result] That of @act@, also if it completed although its stop was requested.
+-- [Failure] Of @act@, also while it is being stopped. Of @pause@ (also while it is being stopped), or else
+--   of @resume@, or of the condition: @act@ is stopped, and it is thrown. After the end of @act@ they are
+--   ignored.
+-- [Fault] Of any of them, also while stopping: thrown, whatever else has failed.
 -- [Cancellation] Requests the stop of everything together. So @resume@ runs beside the cleanup of
 --   @act@, which therefore need not wait for it; a driver must not begin to move because it is resumed
 --   while its goal is being cancelled.
@@ -67,22 +71,49 @@ import Behavior.Internal.Signal.Source
 --
 -- @since 0.1.0.0
 pausedWhile :: Signal Bool -> Behavior () -> Behavior () -> Behavior a -> Behavior a
-pausedWhile condition pause resume act = structured "pausedWhile" $ \scope -> do
-  begun <- newTVarIO False
-  let -- Nothing before the condition was false for the first time.
-      phase holds = do
-        is <- readTVar begun
-        unless (is || holds) (writeTVar begun True)
-        pure (if is || not holds then Just holds else Nothing)
-      phases = Signal $ \_ -> do
-        source <- open (suppressEqual (unlessNamed "condition" condition)) everyValue
-        pure source {view = mapView (>>= phase) <$> view source}
-      pausing = react "pausedWhile" phases $ \case
-        Just True -> Run "pause" ((pause >> sleepForever) `finally` resume)
-        _ -> Idle
-  step <- branch scope (Label "pausedWhile" "branch") (atomically (readTVar begun >>= check) >> act)
-  pauses <- branch scope (Label "pausedWhile" "pauses") pausing
-  atomically ((endedBy "branch" <$> outcome step) `orElse` (endedBy "pauses" <$> outcome pauses))
+pausedWhile condition pause resume act = react "pausedWhile" beginning $ \() -> Run "branch" act
+ where
+  -- It has its value when the condition was false for the first time; meanwhile, and from then on, the
+  -- pauses are its sensor.
+  beginning = Signal $ \_ -> do
+    begun <- newTVarIO False
+    pure
+      (fromView (pure (constantView (readTVar begun >>= check))))
+        { workers = [Worker "pauses" (pure (\_ -> pauses begun))]
+        }
+  pauses begun = react "pausedWhile" (phases begun) $ \case
+    Just True -> Run "pause" (pauseThenResume pause resume)
+    _ -> Idle
+  phases begun = Signal $ \_ -> do
+    source <- open (suppressEqual (unlessNamed "condition" condition)) everyValue
+    pure source {view = mapView (>>= phase begun) <$> view source}
+  -- Nothing before the beginning.
+  phase begun holds = do
+    is <- readTVar begun
+    unless (is || holds) (writeTVar begun True)
+    pure (if is || not holds then Just holds else Nothing)
+
+-- | Pauses, and when it is stopped, or pausing has failed, resumes. Its own stop is received only before
+-- that, and cannot replace what either of them throws.
+pauseThenResume :: Behavior () -> Behavior () -> Behavior ()
+pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
+  pausing <- branch scope (Label "pausedWhile" "pause") pause
+  stopped <-
+    try $
+      awaitOutcome pausing >>= \case
+        Completed () -> sleepForever
+        _ -> pure ()
+  let cause = either causeOf (\() -> SiblingFailed "pause") stopped
+  uninterruptibleMask_ $ do
+    requestStop cause [SomeBranch pausing]
+    paused <- awaitUninterruptibly (awaitOutcome pausing)
+    resumed <- branch scope (Label "pausedWhile" "resume") resume >>= awaitUninterruptibly . awaitOutcome
+    pure . Verdict cause $ do
+      case paused of
+        Failing e -> throwIO e
+        _ -> pure ()
+      outcomeToIO resumed
+      either throwIO pure stopped
 
 -- | Runs a behaviour only while a condition does not hold: when it becomes true, the behaviour is
 -- stopped; when it is false again, the behaviour begins again, from its beginning.
