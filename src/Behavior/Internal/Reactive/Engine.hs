@@ -14,14 +14,13 @@ module Behavior.Internal.Reactive.Engine
 
 import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
-import Data.Maybe (isJust)
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime (Label (..), Seconds, atomically, tryReadThenBlock)
+import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
-import Behavior.Internal.Trace.Decision
-import Behavior.Internal.Trace.Place (Place, myPlace)
+import Behavior.Internal.Trace.Event (Cause (..))
+import Behavior.Internal.Trace.Observer
 
 -- | What an operator does for a value of the signal.
 data Reaction a
@@ -31,10 +30,8 @@ data Reaction a
     RunToEnd String (Behavior (Next a))
   | -- | Wait for another value.
     Idle
-  | -- | End the operator.
-    Conclude (IO a)
-  | -- | End the operator, because this time limit has passed.
-    TimeIsUp Seconds (IO a)
+  | -- | End the operator: for this cause, or because the signal has this value.
+    Conclude (Maybe Cause) (IO a)
 
 -- | What follows a branch that has run to its end.
 data Next a = BeginAgain | EndWith a
@@ -45,21 +42,13 @@ data Engine k a = Engine
   , scope :: Scope
   , source :: Source k
   , reaction :: k -> Reaction a
-  , place :: Maybe Place
-  -- ^ Where it is in a trace, which shows the named values of the signal.
+  , observer :: Observer
   }
 
--- | What wakes the operator.
+-- | What wakes the operator, if it is not the end of its branch.
 data Wakeup k a
-  = BranchEnded (Outcome a)
-  | Changed k Values !(Reaction a)
+  = Changed k Values !(Reaction a)
   | SensorDied SomeException
-
--- | Why a branch is stopped: what the operator does after the branch has ended.
-data Interruption a
-  = Reselect
-  | Recover String (Behavior (Next a))
-  | Finish (IO a)
 
 -- | Runs the reaction to the signal's value, and changes to another reaction when the value
 -- changes.
@@ -67,20 +56,16 @@ react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
 react name signal toReaction = do
   -- (No branch has been started yet: what 'open' throws is simply thrown.)
   opened <- open (suppressEqual signal) everyValue
-  structured name $ \within -> do
-    here <- myPlace
-    startOver
-      Engine {operator = name, scope = within, source = opened, reaction = toReaction, place = here}
-      FirstRead
-      Nothing
+  structured name $ \within -> observing name $ \observed' ->
+    startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction, observer = observed'} FirstRead
 
--- | Starts the sensors, reads the signal, and does what its value requires. (The values are those of
--- the decision before.)
-startOver :: Eq k => Engine k a -> ReadMode -> Maybe Values -> IO (Verdict a)
-startOver engine how before = do
+-- | Starts the sensors, reads the signal, and does what its value requires.
+startOver :: Eq k => Engine k a -> ReadMode -> IO (Verdict a)
+startOver engine how = do
   (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
   wakeup <- atomically (readWakeup engine sensors seen (readView how seen))
-  decideOn engine Nothing before wakeup >>= applyReaction engine sensors seen wakeup
+  cause <- decidesOn engine wakeup
+  applyReaction engine sensors seen cause wakeup
 
 -- | Reads the signal. That runs users' code (views, functions, equality): what that code throws
 -- is caught here, so that any other exception in the operator's thread came from outside.
@@ -92,105 +77,95 @@ readWakeup engine sensors seen value =
  where
   changed = do
     k <- value
-    values <- if isJust (place engine) then readings seen else pure []
+    values <- observed (observer engine) (readings seen)
     pure $! Changed k values (reaction engine k)
 
--- | What the operator has decided, for the trace: which branch runs, and the values of the decision
--- before.
-decideOn :: Engine k a -> Maybe Ran -> Maybe Values -> Wakeup k a -> IO Decision
-decideOn engine ran before = \case
-  Changed _ _ (TimeIsUp limit _) -> pure (timeIsUp limit)
-  Changed _ values next -> case place engine of
-    Nothing -> pure (begins [])
-    Just here
-      | isJust before || isReaction next -> decide here (operator engine) ran before values
-      | otherwise -> pure (begins values)
-  _ -> pure sensorDied
+-- | Why the operator stops what it stops now.
+decidesOn :: Engine k a -> Wakeup k a -> IO Cause
+decidesOn engine = \case
+  SensorDied _ -> pure (SiblingFailed "sensor")
+  Changed _ _ (Conclude (Just cause) _) -> pure cause
+  Changed _ values next -> decides (observer engine) (isReaction next) values
  where
   -- At the beginning.
   isReaction next = case next of
     RunToEnd _ _ -> True
-    Conclude _ -> True
+    Conclude _ _ -> True
     _ -> False
 
 -- | Does what the wakeup requires. No branch runs.
-applyReaction :: Eq k => Engine k a -> Sensors -> View k -> Wakeup k a -> Decision -> IO (Verdict a)
-applyReaction engine sensors seen woken decision = case woken of
-  BranchEnded end -> pure (endedBy "branch" end)
-  SensorDied e -> concluding (throwIO e)
-  Changed _ _ (Conclude verdict) -> concluding verdict
-  Changed _ _ (TimeIsUp _ verdict) -> concluding verdict
+applyReaction :: Eq k => Engine k a -> Sensors -> View k -> Cause -> Wakeup k a -> IO (Verdict a)
+applyReaction engine sensors seen cause = \case
+  SensorDied e -> pure (Verdict cause (throwIO e))
+  Changed _ _ (Conclude _ verdict) -> pure (Verdict cause verdict)
   Changed _ _ (RunToEnd name recovery) -> do
-    orReported decision (requestStopAsync (cause decision) (map SomeBranch sensors))
-    recover engine sensors decision name recovery Nothing
-  Changed old values Idle -> do
-    report decision Nothing
+    requestStopAsync cause (map SomeBranch sensors)
+    recover engine sensors cause name recovery Nothing
+  Changed old _ Idle -> do
+    waits (observer engine)
     change <- atomically (awaitChange old)
-    decideOn engine Nothing (Just values) change >>= applyReaction engine sensors seen change
-  Changed old values (Run name act) -> do
-    report decision (Just name)
-    ran <- traverse (`branchBegins` name) (place engine)
-    running <- starting decision (branch (scope engine) (Label (operator engine) name) act)
+    why <- decidesOn engine change
+    applyReaction engine sensors seen why change
+  Changed old _ (Run name act) -> do
+    running <- starts (observer engine) name (branch (scope engine) (Label (operator engine) name) act)
     -- The branch is read first: one that has ended by itself is not interrupted, whatever
     -- the signal's value is in the same transaction.
     wakeup <-
-      tryReadThenBlock (fmap BranchEnded <$> tryReadOutcome running) . atomically $
-        tryReadOutcomeSTM running >>= maybe (awaitChange old) (pure . BranchEnded)
-    let interrupting next = decideOn engine ran (Just values) wakeup >>= interrupt engine sensors name running next
+      tryReadThenBlock (fmap Left <$> tryReadOutcome running) . atomically $
+        tryReadOutcomeSTM running >>= maybe (Right <$> awaitChange old) (pure . Left)
     case wakeup of
-      BranchEnded end -> pure (endedBy name end)
-      SensorDied e -> interrupting (Finish (throwIO e))
-      Changed _ _ new -> interrupting $ case new of
-        Conclude verdict -> Finish verdict
-        TimeIsUp _ verdict -> Finish verdict
-        RunToEnd name' recovery -> Recover name' recovery
-        _ -> Reselect
+      Left end -> pure (endedBy name end)
+      Right change -> do
+        why <- decidesOn engine change
+        interrupt engine sensors why name running change
  where
   awaitChange old = readWakeup engine sensors seen (reread seen >>= \new -> new <$ check (new /= old))
-  concluding verdict = Verdict (cause decision) verdict <$ report decision Nothing
 
--- | Stops the branch with this name. If it completes nevertheless, its result is that of the operator.
-interrupt :: Eq k => Engine k a -> Sensors -> String -> Branch a -> Interruption a -> Decision -> IO (Verdict a)
-interrupt engine sensors name running next decision = case next of
-  Finish verdict ->
-    stopBranch sensors' >>= \(end, stopped) -> case end of
-      Stopped _ -> Verdict (cause decision) verdict <$ report stopped Nothing
-      _ -> ended stopped end
-  Recover name' recovery ->
-    stopBranch sensors' >>= \(end, stopped) -> case end of
-      Completed _ -> ended stopped end
-      Stopped _ -> forget (scope engine) running >> recover engine sensors stopped name' recovery Nothing
+-- | Stops the branch with this name, for that cause, and does what the wakeup requires. If the branch completes
+-- nevertheless, its result is that of the operator.
+interrupt :: Eq k => Engine k a -> Sensors -> Cause -> String -> Branch a -> Wakeup k a -> IO (Verdict a)
+interrupt engine sensors cause name running = \case
+  SensorDied e -> concluding (throwIO e)
+  Changed _ _ (Conclude _ verdict) -> concluding verdict
+  Changed _ _ (RunToEnd name' recovery) ->
+    stopBranch sensors' >>= \end -> case end of
+      Completed _ -> pure (endedBy name end)
+      Stopped _ -> forget (scope engine) running >> recover engine sensors cause name' recovery Nothing
       -- A cleanup that threw must not keep the robot from its charger.
-      _ -> recover engine sensors stopped name' recovery (Just (outcomeToIO end))
-  Reselect ->
-    stopBranch [] >>= \(end, stopped) -> case end of
+      _ -> recover engine sensors cause name' recovery (Just (outcomeToIO end))
+  Changed {} ->
+    stopBranch [] >>= \end -> case end of
       -- Read again: meanwhile the value may have changed again, perhaps back to the old one.
       Stopped _ -> do
         forget (scope engine) running
-        (seen, woken) <- orReported stopped readAgain
-        applyReaction engine sensors seen woken stopped
-      _ -> ended stopped end
+        (seen, wakeup) <- readAgain
+        applyReaction engine sensors seen cause wakeup
+      _ -> pure (endedBy name end)
  where
   sensors' = map SomeBranch sensors
-  ended stopped end = endedBy name end <$ report stopped Nothing
+  concluding verdict =
+    stopBranch sensors' >>= \end -> pure $ case end of
+      Stopped _ -> Verdict cause verdict
+      _ -> endedBy name end
   -- Waits for the branch, but not for the others.
-  stopBranch others = orReported decision $ do
-    end <- stopIt others
-    (,) end <$> hasStopped (result end) decision
-  stopIt others = do
-    requestStopAsync (cause decision) others
-    requestStop (cause decision) [SomeBranch running]
-    awaitOutcome running
+  stopBranch others = do
+    requestStopAsync cause others
+    requestStop cause [SomeBranch running]
+    end <- awaitOutcome running
+    end <$ hasStopped (observer engine) (result end)
   readAgain = do
     seen <- atomically (view (source engine))
-    (,) seen <$> atomically (readWakeup engine sensors seen (reread seen))
+    wakeup <- atomically (readWakeup engine sensors seen (reread seen))
+    case wakeup of
+      Changed _ values _ -> rereads (observer engine) values
+      SensorDied _ -> pure ()
+    pure (seen, wakeup)
 
 -- | Runs the recovery to its end. The sensors' stop has been requested: the recovery does not
 -- wait for those that are slow to stop, but what comes after it does.
-recover :: Eq k => Engine k a -> Sensors -> Decision -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (Verdict a)
-recover engine sensors decision name recovery taskOutcome = do
-  report decision (Just name)
-  recovered <- starting decision (branch (scope engine) (Label (operator engine) name) recovery)
+recover :: Eq k => Engine k a -> Sensors -> Cause -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (Verdict a)
+recover engine sensors cause name recovery taskOutcome = do
+  recovered <- starts (observer engine) name (branch (scope engine) (Label (operator engine) name) recovery)
   end <- awaitOutcome recovered
   case (result end, taskOutcome) of
     (_, Just verdict) -> concluding verdict
@@ -202,8 +177,8 @@ recover engine sensors decision name recovery taskOutcome = do
       -- (What has faulted stays in the scope.)
       _ <- forgetEnded (scope engine)
       case [fault | Faulted fault <- ends] of
-        [] -> startOver engine Reread (Just (decidedOn decision))
+        [] -> startOver engine Reread
         fault : _ -> concluding (throwIO fault)
  where
   -- (Only sensors are left, whose stop has been requested.)
-  concluding = pure . Verdict (cause decision)
+  concluding = pure . Verdict cause

@@ -179,7 +179,7 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
 -- @since 0.1.0.0
 waitUntil :: Signal Bool -> Behavior ()
 waitUntil condition = react "waitUntil" (unlessNamed "condition" condition) $ \case
-  True -> Conclude (pure ())
+  True -> Conclude Nothing (pure ())
   False -> Idle
 
 -- | A guard: runs the behaviour while the condition holds, and fails if the condition does not
@@ -202,7 +202,7 @@ waitUntil condition = react "waitUntil" (unlessNamed "condition" condition) $ \c
 whileHolding :: Signal Bool -> Behavior a -> Behavior a
 whileHolding condition behavior = react "whileHolding" (orReason condition) $ \case
   Nothing -> Run "branch" behavior
-  Just reason -> Conclude (failWith reason)
+  Just reason -> Conclude Nothing (failWith reason)
 
 -- | Nothing while the condition holds; otherwise the reason why a guard fails.
 orReason :: Signal Bool -> Signal (Maybe String)

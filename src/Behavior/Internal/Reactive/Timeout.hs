@@ -24,6 +24,7 @@ import Behavior.Internal.Reactive.Engine (Reaction (..), react)
 import Behavior.Internal.Runtime (atomically, now, sleepUntil)
 import Behavior.Internal.Seconds (Seconds, duration, moment)
 import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), constantView, fromView)
+import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior (sleep, (?))
@@ -56,7 +57,7 @@ timeout :: Seconds -> Behavior a -> Behavior a
 timeout seconds behavior = do
   limit <- duration "timeout" seconds
   react "timeout" (elapsed limit) $ \case
-    True -> TimeIsUp limit (throwIO (TimedOut limit))
+    True -> Conclude (Just (TimeLimit limit)) (throwIO (TimedOut limit))
     False -> Run "branch" behavior
 
 -- | 'timeout' with a deadline, a moment on the clock of 'Behavior.Time.now', in place of a duration.
@@ -91,7 +92,7 @@ timeoutAt seconds behavior = do
   end <- moment "timeoutAt" seconds
   limit <- (\t -> max 0 (end - t)) <$> now
   react "timeoutAt" (reached end limit) $ \case
-    True -> TimeIsUp limit (throwIO (TimedOut limit))
+    True -> Conclude (Just (TimeLimit limit)) (throwIO (TimedOut limit))
     False -> Run "branch" behavior
 
 -- | The failure of a behaviour that took longer than the given number of seconds.
@@ -134,7 +135,7 @@ cleanupWithin :: Seconds -> Behavior a -> Behavior (Maybe a)
 cleanupWithin seconds behavior = uninterruptibleMask_ $ do
   limit <- duration "cleanupWithin" seconds
   react "cleanupWithin" (elapsed limit) $ \case
-    True -> TimeIsUp limit (pure Nothing)
+    True -> Conclude (Just (TimeLimit limit)) (pure Nothing)
     False -> Run "branch" (Just <$> behavior)
 
 -- | False until the given number of seconds has passed since the signal was opened.

@@ -21,7 +21,7 @@ import Control.Monad (forever, unless, when)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Seconds (duration, moment)
 import Behavior.Internal.Signal.Source
-import Behavior.Internal.Trace.Decision (Reading)
+import Behavior.Internal.Trace.Observer (Reading)
 
 -- $setup
 -- >>> import Behavior

@@ -43,7 +43,7 @@ import Data.Traversable (for)
 import Behavior.Internal.Failure (failWith)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
-import Behavior.Internal.Trace.Decision (Reading (..))
+import Behavior.Internal.Trace.Observer (Reading (..))
 import Behavior.Internal.Trace.Place (isTraced)
 
 -- $setup
