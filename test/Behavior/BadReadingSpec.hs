@@ -195,7 +195,7 @@ stale = do
     let reading = Source.inFlightSince source
     atomically reading `shouldReturn` Nothing
     structured "test" $ \scope -> do
-      (seen, _) <- startSensors scope "test" source
+      (seen, _) <- startSensors scope source
       atomically (Source.firstRead seen)
       atomically reading `shouldReturn` Nothing
       pure (Verdict (SiblingFinished "test") (pure ()))
@@ -206,13 +206,13 @@ stale = do
     source <- Source.open (sensing level) Source.everyValue {Source.readingTimes = True}
     let reading = Source.inFlightSince source
     structured "test" $ \scope -> do
-      (_, workers) <- startSensors scope "test" source
+      (_, workers) <- startSensors scope source
       pass entered
       began <- atomically reading
       began `shouldSatisfy` isJust
       requestStopAsync (SiblingFinished "test") (map SomeBranch workers)
       for_ workers (atomically . outcome)
-      _ <- startSensors scope "test" source
+      _ <- startSensors scope source
       atomically reading >>= (`shouldSatisfy` (/= began))
       pure (Verdict (SiblingFinished "test") (pure ()))
 
@@ -222,7 +222,7 @@ stale = do
     level <- newSensor $ \n -> when (n == 1) (open entered >> pass mayEnd)
     source <- Source.open (Signal.staleAfter 0.001 (sensing level)) Source.everyValue
     structured "test" $ \scope -> do
-      (seen, _) <- startSensors scope "test" source
+      (seen, _) <- startSensors scope source
       let isStale view = atomically ((False <$ Source.firstRead view) `catchSTM` \(_ :: Failed) -> pure True)
       pass entered
       isStale seen `shouldReturn` True

@@ -198,7 +198,7 @@ scopes = do
     for_ [pure (), failed] $ \bodysEnd -> do
       (_, done) <- observing $ \entries -> inScope $ \scope -> do
         inside <- newGate
-        _ <- branch scope label ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
+        _ <- branch scope "branch" ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
         pass inside
         pure (note entries "verdict" >> bodysEnd)
       done `shouldBe` ["cleaned up", "verdict"]
@@ -206,7 +206,7 @@ scopes = do
   it "stops what was started when the body throws" $ do
     (end, done) <- observing $ \entries -> inScope $ \scope -> do
       inside <- newGate
-      _ <- branch scope label ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
+      _ <- branch scope "branch" ((open inside >> hang) `onException` note entries "cleaned up") :: IO (Branch ())
       pass inside
       throwIO (Fault "body") :: IO (IO ())
     (end, done) `shouldBe` (FaultedWith (show (Fault "body")), ["cleaned up"])
@@ -215,7 +215,7 @@ scopes = do
     (_, values) <- observing $ \entries -> inScope $ \scope -> do
       inside <- newGate
       mayEnd <- newGate
-      started <- worker scope label $ \stopRequested -> do
+      started <- branchWith plainly scope "branch" $ \stopRequested -> do
         stopRequested >>= note entries
         (open inside >> hang) `catch` \(_ :: SomeAsyncException) -> stopRequested >>= note entries
         pass mayEnd
@@ -230,7 +230,7 @@ scopes = do
       inside <- newGate
       cleaning <- newGate
       mayEnd <- newGate
-      started <- branch scope label $
+      started <- branch scope "branch" $
         (open inside >> hang)
           `onException` (open cleaning >> pass mayEnd >> note entries "cleaned up") :: IO (Branch ())
       pass inside
@@ -246,7 +246,7 @@ scopes = do
       insides <- replicateM 3 newGate
       mayEnd <- newGate
       let act inside = uninterruptibleMask_ (open inside >> pass mayEnd) >> hang
-      started <- traverse (branch scope label . act) insides
+      started <- traverse (branch scope "branch" . act) insides
       traverse_ pass insides
       requestStopAsync cause (map SomeBranch (started :: [Branch ()]))
       note entries "requested"
@@ -256,8 +256,8 @@ scopes = do
 
   it "gives the outcome of each branch, and turns it back into a result or an exception" $
     inScope $ \scope -> do
-      well <- branch scope label (pure 'a')
-      badly <- branch scope label (failed :: IO Char)
+      well <- branch scope "branch" (pure 'a')
+      badly <- branch scope "branch" (failed :: IO Char)
       (outcomeToIO =<< awaitOutcome well) `shouldReturn` 'a'
       (outcomeToIO =<< atomically (outcome well)) `shouldReturn` 'a'
       (outcomeToIO =<< atomically (outcome badly)) `shouldThrow` (== Failed)
@@ -270,7 +270,7 @@ scopes = do
     (end, done) <- observing $ \entries -> do
       let operator = inScope $ \scope -> do
             _ <-
-              branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd))
+              branch scope "branch" (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd))
                 :: IO (Branch ())
             pass inside
             pure (failed :: IO ())
@@ -298,7 +298,7 @@ scopes = do
       let operator = inScope $ \scope -> do
             inside <- newGate
             _ <-
-              branch scope label (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd))
+              branch scope "branch" (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd))
                 :: IO (Branch ())
             pass inside
             pure (pure "verdict")
@@ -313,7 +313,7 @@ scopes = do
     it ("throws a branch's fault rather than " ++ show deadlock) $ do
       inside <- newGate
       let operator = inScope $ \scope -> do
-            _ <- branch scope label ((open inside >> hang) `onException` throwIO (Fault "branch")) :: IO (Branch ())
+            _ <- branch scope "branch" ((open inside >> hang) `onException` throwIO (Fault "branch")) :: IO (Branch ())
             hang :: IO (IO ())
       withThread operator $ \caller -> do
         pass inside

@@ -72,7 +72,7 @@ abandoning seconds act = do
   -- Masked, so that no exception comes before the handler is in place: without it 'structured' would
   -- wait for the branch.
   structured "abandoning" $ \scope -> mask $ \restore -> do
-    (acting, endSpans) <- abandonableIn (branchWithHook countOff scope (Label "abandoning" "branch") act)
+    (acting, endSpans) <- abandonableIn (branchWith plainly {hook = countOff} scope "branch" (const act))
     restore (endedBy "branch" <$> awaitOutcome acting)
       `catch` \e -> stopWithin limit isAbandoned endSpans scope (causeOf e) acting >> throwIO (e :: SomeException)
 
@@ -81,7 +81,7 @@ abandoning seconds act = do
 stopWithin :: Seconds -> TVar Bool -> IO () -> Scope -> Cause -> Branch a -> IO ()
 stopWithin limit isAbandoned endSpans scope cause acting = do
   requestStopAsync cause [SomeBranch acting]
-  clock <- branch scope (Label "abandoning" "clock") (sleep limit)
+  clock <- branch scope "clock" (sleep limit)
   -- The branch is read first: one that has ended is not abandoned.
   join . awaitUninterruptibly . atomically $
     tryReadOutcomeSTM acting >>= \case

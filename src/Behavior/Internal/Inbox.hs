@@ -29,7 +29,7 @@ import qualified Data.Sequence as Seq
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine (Next (..), Reaction (..), react)
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Runtime (atomically)
 import Behavior.Internal.Scope (branch, endedBy, outcome, structured)
 import Behavior.Internal.Signal.Source (Signal, named, watching)
 import qualified Behavior.Internal.Trace.Span as Span
@@ -199,7 +199,7 @@ messageRule inbox handle = do
   someWaits = atomically (queued inbox >>= check . (> 0))
   -- A handler that completes although its stop was requested does not keep the rule from being stopped.
   inBranch act = structured "messageRule" $ \scope ->
-    branch scope (Label "messageRule" "handler") act >>= fmap (endedBy "handler") . atomically . outcome
+    branch scope "handler" act >>= fmap (endedBy "handler") . atomically . outcome
 
 -- | Waits for a message, and has it handled: once.
 --

@@ -28,7 +28,7 @@ import Data.Foldable (asum, traverse_)
 
 import Behavior.Internal.Failure
 import Behavior.Internal.Leftmost
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Runtime (atomically)
 import Behavior.Internal.Scope hiding (requestStop)
 import Behavior.Internal.Trace.Event (Cause (..))
 
@@ -113,7 +113,7 @@ scoped body = do
 serveRequests :: Nursery -> Scope -> Behavior a -> IO (Verdict a)
 serveRequests nursery scope body = do
   failure <- newLeftmost
-  main <- branch scope (Label "scoped" "body") body
+  main <- branch scope "body" body
   let -- How many were forked, and at which number the scope is to forget those that have ended. That
       -- walks over all of them, so it waits for as many forks as there are branches left.
       serve count sweepAt = do
@@ -135,7 +135,7 @@ serveRequests nursery scope body = do
           let n = count + 1 :: Int
           -- Masked: a branch that was started is also handed over.
           mask_ $
-            branchWithHook (traverse_ (publish failure n) . thrownBy) scope (Label "scoped" "fork") act
+            branchWith plainly {hook = traverse_ (publish failure n) . thrownBy} scope "fork" (const act)
               >>= atomically . putTMVar accepted
           pure n
   serve 0 16

@@ -32,7 +32,7 @@ import Data.Traversable (mapAccumL)
 
 import Behavior.Internal.Failure (Behavior, BehaviorFailed, failWith, failed)
 import Behavior.Internal.Leftmost
-import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
+import Behavior.Internal.Runtime (atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Trace.Event (Cause (..))
 
@@ -61,8 +61,8 @@ import Behavior.Internal.Trace.Event (Cause (..))
 -- @since 0.1.0.0
 parallel :: Behavior a -> Behavior b -> Behavior ()
 parallel left right = structured "parallel" $ \scope -> do
-  l <- branch scope (Label "parallel" "left") (void left)
-  r <- branch scope (Label "parallel" "right") (void right)
+  l <- branch scope "left" (void left)
+  r <- branch scope "right" (void right)
   -- Outside a transaction only the left one is read: if the right one were read so, the left
   -- one might have ended before it.
   tryReadThenBlock
@@ -100,8 +100,8 @@ infixr 2 |||
 -- @since 0.1.0.0
 both :: Behavior a -> Behavior b -> Behavior ()
 both left right = structured "both" $ \scope -> do
-  l <- branch scope (Label "both" "left") (void left)
-  r <- branch scope (Label "both" "right") (void right)
+  l <- branch scope "left" (void left)
+  r <- branch scope "right" (void right)
   let -- The left one is read first: what has ended then has also ended when the right one is read.
       tryReadBoth = tryReadOutcome l >>= maybe (pure Nothing) (\known -> verdict (Just known) <$!> tryReadOutcome r)
       readBoth = verdict <$> tryReadOutcomeSTM l <*> tryReadOutcomeSTM r
@@ -132,7 +132,7 @@ firstOf :: [Behavior a] -> Behavior a
 firstOf [] = failed
 firstOf behaviors = structured "firstOf" $ \scope -> do
   first <- newLeftmost
-  void $ startAll (\n -> branchWithHook (publish first n) scope (Label "firstOf" (show n))) behaviors
+  void $ startAll scope (publish first) behaviors
   (n, end) <- tryReadThenBlock (tryReadLeftmost first) (atomically (readLeftmost first))
   pure (endedBy (show n) end)
 
@@ -151,10 +151,9 @@ firstOf behaviors = structured "firstOf" $ \scope -> do
 allOf :: Traversable t => t (Behavior a) -> Behavior (t a)
 allOf behaviors = structured "allOf" $ \scope -> do
   failure <- newLeftmost
-  branches <-
-    startAll (\n -> branchWithHook (publishFailure failure n) scope (Label "allOf" (show n))) (toList behaviors)
+  these <- startAll scope (publishFailure failure) (toList behaviors)
   let awaitAll [] =
-        pure (Verdict (SiblingFinished "all") (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) branches))
+        pure (Verdict (SiblingFinished "all") (refilled behaviors <$> traverse (outcomeToIO <=< awaitOutcome) these))
       awaitAll (b : bs) = do
         failing <-
           tryReadThenBlock ((Nothing <$) <$> completedNow b) . atomically $
@@ -162,7 +161,7 @@ allOf behaviors = structured "allOf" $ \scope -> do
               Just (Completed _) -> pure Nothing
               _ -> Just <$> readLeftmost failure
         maybe (awaitAll bs) (\(n, e) -> pure (Verdict (SiblingFailed (show n)) (throwIO e))) failing
-  awaitAll branches
+  awaitAll these
 
 -- | Starts all behaviours at once, and runs the behaviour that a function of their ends chooses.
 --
@@ -207,7 +206,7 @@ decide choose behaviors =
     Just chosen -> chosen
     Nothing -> join . structured "decide" $ \scope -> do
       ends <- newTVarIO (Right IntMap.empty)
-      void $ startAll (\n -> branchWithHook (addEnd ends n) scope (Label "decide" (show n))) behaviors
+      void $ startAll scope (addEnd ends) behaviors
       chooseAfter ends IntMap.empty
  where
   -- What the function throws is caught where it runs: what is thrown in the operator's thread
@@ -302,11 +301,12 @@ refilled container = snd . flip (mapAccumL next) container
   next (a : as) _ = (as, a)
   next [] _ = error "refilled: there are fewer elements than places"
 
--- | Starts behaviours from left to right; the function is given each one's number.
+-- | Starts behaviours from left to right, in branches that are numbered from 1; the function is given a branch's
+-- number, and is part of the transaction that publishes how it ended.
 --
 -- In constant stack: after each start GHC may run another thread, and before that it traverses
 -- the whole stack of this one.
-startAll :: (Int -> Behavior a -> IO (Branch a)) -> [Behavior a] -> IO [Branch a]
-startAll startOne = fmap reverse . foldM next [] . zip [1 ..]
+startAll :: Scope -> (Int -> Outcome a -> STM ()) -> [Behavior a] -> IO [Branch a]
+startAll scope publishing = fmap reverse . foldM next [] . zip [1 ..]
  where
-  next started (n, act) = (: started) <$> startOne n act
+  next started (n, act) = (: started) <$> branchWith plainly {hook = publishing n} scope (show n) (const act)

@@ -11,7 +11,7 @@ module Behavior.Internal.Pinned
   ) where
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime (Label (..), Placement (..))
+import Behavior.Internal.Runtime (Placement (..))
 import Behavior.Internal.Scope
 
 -- | Runs a behaviour with all its branches on one capability: the one that the caller runs on.
@@ -65,6 +65,6 @@ unpinned :: Behavior a -> Behavior a
 unpinned = inBranch Unpinned "unpinned"
 
 inBranch :: Placement -> String -> Behavior a -> Behavior a
-inBranch placement operator act = structured operator $ \scope -> do
-  body <- branchPlaced placement scope (Label operator "body") act
+inBranch here operator act = structured operator $ \scope -> do
+  body <- branchWith plainly {placement = here} scope "body" (const act)
   endedBy "body" <$> awaitOutcome body

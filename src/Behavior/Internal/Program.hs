@@ -14,7 +14,7 @@ import System.Exit (ExitCode (..))
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.ProcessSignals (withSignals)
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Runtime (atomically)
 import Behavior.Internal.Scope
 import Behavior.Internal.Trace.Event (Cause (..))
 
@@ -57,7 +57,7 @@ import Behavior.Internal.Trace.Event (Cause (..))
 runBehavior :: Behavior a -> IO a
 runBehavior behavior = withSignals $ \signal ->
   structured "runBehavior" $ \scope -> do
-    program <- branch scope (Label "runBehavior" "program") behavior
+    program <- branch scope "program" behavior
     atomically $ (endedBy "program" <$> outcome program) `orElse` (stopped <$> signal)
  where
   stopped (name, code) = Verdict (FromOutside name) (throwIO (ExitFailure code))

@@ -6,9 +6,9 @@
 
 -- |
 -- The seam: everything that the library does with threads, time and blocking goes through
--- this module. No other module (except the timers that it sleeps by,
--- "Behavior.Internal.Runtime.TimerWheel", and the simulator) forks, delays, throws to a thread or
--- blocks in a transaction. So a simulation that replaces the operations of this module replaces all
+-- this module. No other module (except what it uses, "Behavior.Internal.Runtime.Fork" and
+-- "Behavior.Internal.Runtime.TimerWheel", the simulator, and the threads of a trace's sinks) forks, delays, throws
+-- to a thread or blocks in a transaction. So a simulation that replaces the operations of this module replaces all
 -- of them.
 --
 -- Each operation is dispatched to one of two backends: the real one, or the simulation that
@@ -59,11 +59,9 @@ import Control.Concurrent
   , forkIO
   , getNumCapabilities
   , myThreadId
-  , threadCapability
   , throwTo
   , yield
   )
-import Control.Concurrent.Async (Async, asyncOnWithUnmask, asyncThreadId, asyncWithUnmask)
 import Control.Concurrent.STM (STM, TVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
@@ -90,6 +88,7 @@ import GHC.RTS.Flags (DoTrace (..), TraceFlags (tracing), getTraceFlags)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Counter
 import Behavior.Internal.Runtime.Dispatch
+import Behavior.Internal.Runtime.Fork
 import qualified Behavior.Internal.Runtime.TimerWheel as Timer
 import Behavior.Internal.Seconds
 import Behavior.Internal.Trace.Place (Place, inPath, myPlace)
@@ -97,17 +96,13 @@ import Behavior.Internal.Trace.Span (branchSpan)
 
 -- | A thread that the library has started, and what it publishes as it ends.
 --
--- (Not an @Async r@: to read the result of that without blocking takes a transaction, and the
--- transaction that publishes it writes nothing else.)
+-- (Not an @Async r@: to read the result of that without blocking takes a transaction, the transaction that
+-- publishes it writes nothing else, and a branch would take more bytes.)
 data Thread r = Thread
-  { threadAsync :: {-# UNPACK #-} !(Async ())
+  { threadId :: !ThreadId
   , threadResult :: {-# UNPACK #-} !(TVar (Maybe r))
   -- ^ Nothing until it has ended, cleanup included.
   }
-
--- | The thread itself.
-threadId :: Thread r -> ThreadId
-threadId = asyncThreadId . threadAsync
 
 -- | What the thread published; retries until it has ended.
 threadEnd :: Thread r -> STM r
@@ -145,35 +140,17 @@ startReally placement finish hook label act = do
   here <- myPlace
   -- The thread is masked, as the caller is: an exception is raised neither before 'try' is in
   -- place, nor between the end of the action and the publication of its outcome.
-  thread <- asyncPlaced placement $ \unmask -> do
-    end <- runThread here label (unmask act) >>= finish
+  thread <- fork placement $ do
+    end <- runThread here label (unmasked act) >>= finish
     STM.atomically (STM.writeTVar result (Just end) >> hook end)
   pure (Thread thread result)
 {-# INLINE startReally #-}
-
--- | On which of GHC's capabilities a thread runs.
-data Placement
-  = -- | Like the thread that starts it: if that is pinned, on the same capability; otherwise
-    -- wherever GHC moves it.
-    Inherited
-  | -- | Always on the capability on which the thread runs that starts it.
-    Pinned
-  | -- | Wherever GHC moves it.
-    Unpinned
-  deriving (Eq)
-
--- | 'asyncWithUnmask' for a thread with that placement.
-asyncPlaced :: Placement -> ((forall b. IO b -> IO b) -> IO a) -> IO (Async a)
-asyncPlaced placement act = do
-  (capability, pinned) <- threadCapability =<< myThreadId
-  let here = placement == Pinned || placement == Inherited && pinned
-  if here then asyncOnWithUnmask capability act else asyncWithUnmask act
 
 startSimulated :: (Either SomeException a -> IO r) -> (r -> STM ()) -> Label -> IO a -> Simulator -> IO (Thread r)
 startSimulated finish hook label act simulation = do
   result <- STM.newTVarIO Nothing
   here <- myPlace
-  let run unmasked = recordStart simulation >> runThread here label unmasked >>= finish
+  let run whole = recordStart simulation >> runThread here label whole >>= finish
   thread <- spawn simulation label (\begin unmask -> run (unmask (begin >> toItsEnd))) $ \end ->
     STM.writeTVar result (Just end) >> hook end
   add threads 1

@@ -32,9 +32,9 @@ module Behavior.Internal.Scope
   , awaitOutcome
   , SomeBranch (..)
   , branch
-  , branchPlaced
-  , branchWithHook
-  , worker
+  , Starting (..)
+  , plainly
+  , branchWith
   , forget
   , forgetEnded
   , requestStopAsync
@@ -75,9 +75,13 @@ import Behavior.Internal.Stop (Stop (..), causeOf, isStopOf)
 import Behavior.Internal.Trace.Event (Cause (..))
 import Behavior.Internal.Trace.Span (operatorSpan)
 
--- | The branches that an operator has started, newest first. Only the operator's
--- own thread starts, stops and forgets them.
-newtype Scope = Scope (IORef [SomeBranch])
+-- | What an operator has started.
+data Scope = Scope
+  { operator :: String
+  -- ^ Its name, which labels, spans and causes have.
+  , branches :: {-# UNPACK #-} !(IORef [SomeBranch])
+  -- ^ The newest first. Only the operator's own thread starts, stops and forgets them.
+  }
 
 -- | A behaviour that an operator runs in a separate thread.
 data Branch a = Branch
@@ -128,14 +132,14 @@ endedBy name end = Verdict cause (outcomeToIO end)
 -- | Runs the body of the operator with this name, which starts branches and gives a verdict; stops the
 -- branches that still run, and gives the outcome.
 structured :: String -> (Scope -> IO (Verdict a)) -> IO a
-structured operator = operatorSpan operator inScope
+structured name = operatorSpan name (inScope name)
 {-# INLINE structured #-}
 
-inScope :: (Scope -> IO (Verdict a)) -> IO a
-inScope body = do
+inScope :: String -> (Scope -> IO (Verdict a)) -> IO a
+inScope name body = do
   state <- getMaskingState
   mask $ \restore -> do
-    scope <- Scope <$> newIORef []
+    scope <- Scope name <$> newIORef []
     -- (Written as @body scope@ it would be a thunk first, in every operator.)
     verdict <- try (restore (pure scope >>= body))
     (thrown, faults) <- stopAll scope state (either causeOf causeIn verdict) (either Just (const Nothing) verdict)
@@ -172,8 +176,8 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 -- the end of that limit.)
 -- A caller that is masked cannot be interrupted here at all: it must not lose the verdict.
 stopAll :: Scope -> MaskingState -> Cause -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
-stopAll (Scope branches) state cause before = do
-  newestFirst <- readIORef branches
+stopAll scope state cause before = do
+  newestFirst <- readIORef (branches scope)
   (thrown, ()) <- interruptibleOnce before (requestStop cause newestFirst)
   fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
  where
@@ -196,35 +200,38 @@ stopAll (Scope branches) state cause before = do
           (,) (if deadlocked then Nothing else Just e) <$> awaitUninterruptibly wait
     _ -> (,) thrown <$> awaitUninterruptibly wait
 
--- | Starts a branch.
-branch :: Scope -> Label -> IO a -> IO (Branch a)
-branch = branchPlaced Inherited
+-- | Starts the branch with this name.
+branch :: Scope -> String -> IO a -> IO (Branch a)
+branch scope name act = branchWith plainly scope name (const act)
 
--- | Like 'branch', on the capability that the placement says.
-branchPlaced :: Placement -> Scope -> Label -> IO a -> IO (Branch a)
-branchPlaced placement scope label act = launch scope (\_ -> startWith placement classify (\_ -> pure ()) label act)
+-- | How a branch is started.
+data Starting a = Starting
+  { placement :: Placement
+  -- ^ On which capability.
+  , hook :: Outcome a -> STM ()
+  -- ^ Part of the transaction that publishes how the branch ended.
+  }
 
--- | Like 'branch'; the given transaction is part of the one that publishes how the branch ended.
-branchWithHook :: (Outcome a -> STM ()) -> Scope -> Label -> IO a -> IO (Branch a)
-branchWithHook hook scope label act = launch scope (\_ -> startWith Inherited classify hook label act)
+-- | Where GHC moves it, and with no hook.
+plainly :: Starting a
+plainly = Starting {placement = Inherited, hook = \_ -> pure ()}
 
--- | Starts a branch that can read whether its stop was requested. A branch that runs a user's
--- action in a loop must read it: the action may have swallowed the request.
-worker :: Scope -> Label -> (IO Bool -> IO a) -> IO (Branch a)
-worker scope label act = launch scope (startWith Inherited classify (\_ -> pure ()) label . act)
-
-launch :: Scope -> (IO Bool -> IO (Thread (Outcome a))) -> IO (Branch a)
-launch (Scope branches) startThread = mask_ $ do
+-- | Starts the branch with this name. Its action can read whether its stop was requested; one that runs a user's
+-- action in a loop must read it: the user's action may have swallowed the request.
+branchWith :: Starting a -> Scope -> String -> (IO Bool -> IO a) -> IO (Branch a)
+branchWith how scope name act = mask_ $ do
   requested <- newIORef False
-  thread <- startThread (readIORef requested)
+  let label = Label (operator scope) name
+  thread <- startWith (placement how) classify (hook how) label (act (readIORef requested))
   let new = Branch {branchThread = thread, stopRequested = requested}
-  modifyIORef' branches (SomeBranch new :)
+  modifyIORef' (branches scope) (SomeBranch new :)
   pure new
+{-# INLINE branchWith #-}
 
 -- | Removes from the scope a branch that has ended and did not fault. Otherwise the scope
 -- would grow with every branch that an operator ever started. (It is mostly the newest one.)
 forget :: Scope -> Branch a -> IO ()
-forget (Scope branches) old = modifyIORef' branches without
+forget scope old = modifyIORef' (branches scope) without
  where
   without [] = []
   without (SomeBranch b : others)
@@ -234,9 +241,9 @@ forget (Scope branches) old = modifyIORef' branches without
 -- | Removes from the scope all branches that have ended and did not fault, in one walk over it, and
 -- gives how many are left. (To 'forget' one is a walk over all that are newer.)
 forgetEnded :: Scope -> IO Int
-forgetEnded (Scope branches) = do
-  (left, oldestFirst) <- readIORef branches >>= foldM without (0, [])
-  left <$ (writeIORef branches $! reverse oldestFirst)
+forgetEnded scope = do
+  (left, oldestFirst) <- readIORef (branches scope) >>= foldM without (0, [])
+  left <$ (writeIORef (branches scope) $! reverse oldestFirst)
  where
   without (left, others) this@(SomeBranch b) = do
     end <- tryReadOutcome b
@@ -251,13 +258,13 @@ forgetEnded (Scope branches) = do
 -- interrupted at the moment does not delay the request of another. It does not wait until
 -- they have stopped; so an interruption of the caller withdraws no request.
 requestStopAsync :: Cause -> [SomeBranch] -> IO ()
-requestStopAsync cause branches = mask_ $ claimStopRequests branches >>= throwToAll (`Stop` cause)
+requestStopAsync cause these = mask_ $ claimStopRequests these >>= throwToAll (`Stop` cause)
 
 -- | Like 'requestStopAsync', for a caller that then waits for the end of all of them, and may
 -- block here, too: the request for a single branch needs no helper thread, and so costs less.
 requestStop :: Cause -> [SomeBranch] -> IO ()
-requestStop cause branches = mask_ $
-  claimStopRequests branches >>= \case
+requestStop cause these = mask_ $
+  claimStopRequests these >>= \case
     [thread] -> throwToOne thread (Stop thread cause)
     threads -> throwToAll (`Stop` cause) threads
 

@@ -10,13 +10,14 @@ module Behavior.Internal.Reactive.Engine
   ( Reaction (..)
   , Next (..)
   , react
+  , reactToCondition
   ) where
 
 import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime (Label (..), atomically, tryReadThenBlock)
+import Behavior.Internal.Runtime (atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
 import Behavior.Internal.Trace.Event (Cause (..))
@@ -38,8 +39,7 @@ data Next a = BeginAgain | EndWith a
 
 -- | The parts of a running operator that do not change.
 data Engine k a = Engine
-  { operator :: String
-  , scope :: Scope
+  { scope :: Scope
   , source :: Source k
   , reaction :: k -> Reaction a
   , observer :: Observer
@@ -53,16 +53,24 @@ data Wakeup k a
 -- | Runs the reaction to the signal's value, and changes to another reaction when the value
 -- changes.
 react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
-react name signal toReaction = do
+react = reactNaming id
+
+-- | The same for a condition, which a trace shows under the name \"condition\" if it has none.
+reactToCondition :: String -> Signal Bool -> (Bool -> Reaction a) -> Behavior a
+reactToCondition = reactNaming (orNamed "condition")
+
+reactNaming :: Eq k => (Source k -> Source k) -> String -> Signal k -> (k -> Reaction a) -> Behavior a
+reactNaming naming name signal toReaction = do
   -- (No branch has been started yet: what 'open' throws is simply thrown.)
-  opened <- open (suppressEqual signal) everyValue
-  structured name $ \within -> observing name $ \observed' ->
-    startOver Engine {operator = name, scope = within, source = opened, reaction = toReaction, observer = observed'} FirstRead
+  opened <- openInTrace naming (suppressEqual signal) everyValue
+  structured name $ \within -> do
+    seen <- newObserver name
+    ending seen (startOver Engine {scope = within, source = opened, reaction = toReaction, observer = seen} FirstRead)
 
 -- | Starts the sensors, reads the signal, and does what its value requires.
 startOver :: Eq k => Engine k a -> ReadMode -> IO (Verdict a)
 startOver engine how = do
-  (seen, sensors) <- startSensors (scope engine) (operator engine) (source engine)
+  (seen, sensors) <- startSensors (scope engine) (source engine)
   wakeup <- atomically (readWakeup engine sensors seen (readView how seen))
   cause <- decidesOn engine wakeup
   applyReaction engine sensors seen cause wakeup
@@ -107,7 +115,7 @@ applyReaction engine sensors seen cause = \case
     why <- decidesOn engine change
     applyReaction engine sensors seen why change
   Changed old _ (Run name act) -> do
-    running <- starts (observer engine) name (branch (scope engine) (Label (operator engine) name) act)
+    running <- starts (observer engine) name (branch (scope engine) name act)
     -- The branch is read first: one that has ended by itself is not interrupted, whatever
     -- the signal's value is in the same transaction.
     wakeup <-
@@ -165,7 +173,7 @@ interrupt engine sensors cause name running = \case
 -- wait for those that are slow to stop, but what comes after it does.
 recover :: Eq k => Engine k a -> Sensors -> Cause -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (Verdict a)
 recover engine sensors cause name recovery taskOutcome = do
-  recovered <- starts (observer engine) name (branch (scope engine) (Label (operator engine) name) recovery)
+  recovered <- starts (observer engine) name (branch (scope engine) name recovery)
   end <- awaitOutcome recovered
   case (result end, taskOutcome) of
     (_, Just verdict) -> concluding verdict

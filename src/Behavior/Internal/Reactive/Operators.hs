@@ -58,7 +58,7 @@ import Behavior.Internal.Signal.Source
 --
 -- @since 0.1.0.0
 rSelect :: Signal Bool -> Behavior a -> Behavior a -> Behavior a
-rSelect condition left right = react "rSelect" (unlessNamed "condition" condition) $ \case
+rSelect condition left right = reactToCondition "rSelect" condition $ \case
   True -> Run "left" left
   False -> Run "right" right
 
@@ -95,7 +95,7 @@ rSelect condition left right = react "rSelect" (unlessNamed "condition" conditio
 --
 -- @since 0.1.0.0
 monitor :: Signal Bool -> Behavior () -> Behavior a -> Behavior a
-monitor condition recovery task = react "monitor" (unlessNamed "condition" condition) $ \case
+monitor condition recovery task = reactToCondition "monitor" condition $ \case
   True -> RunToEnd "recovery" (BeginAgain <$ recovery)
   False -> Run "task" task
 
@@ -128,7 +128,7 @@ monitor condition recovery task = react "monitor" (unlessNamed "condition" condi
 --
 -- @since 0.1.0.0
 insteadWhen :: Signal Bool -> Behavior a -> Behavior a -> Behavior a
-insteadWhen condition emergency act = react "insteadWhen" (unlessNamed "condition" condition) $ \case
+insteadWhen condition emergency act = reactToCondition "insteadWhen" condition $ \case
   True -> RunToEnd "emergency" (EndWith <$> emergency)
   False -> Run "branch" act
 
@@ -178,7 +178,7 @@ teleoReactive rules = react "teleoReactive" firstHolding $ \case
 --
 -- @since 0.1.0.0
 waitUntil :: Signal Bool -> Behavior ()
-waitUntil condition = react "waitUntil" (unlessNamed "condition" condition) $ \case
+waitUntil condition = reactToCondition "waitUntil" condition $ \case
   True -> Conclude Nothing (pure ())
   False -> Idle
 

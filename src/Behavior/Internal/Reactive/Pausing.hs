@@ -17,7 +17,7 @@ import Control.Monad (unless)
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine
 import Behavior.Internal.Repeating (sleepForever)
-import Behavior.Internal.Runtime (Label (..), awaitUninterruptibly)
+import Behavior.Internal.Runtime (awaitUninterruptibly)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
 import Behavior.Internal.Stop (causeOf)
@@ -97,7 +97,7 @@ pausedWhile condition pause resume act = react "pausedWhile" beginning $ \() -> 
 -- that, and cannot replace what either of them throws.
 pauseThenResume :: Behavior () -> Behavior () -> Behavior ()
 pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
-  pausing <- branch scope (Label "pausedWhile" "pause") pause
+  pausing <- branch scope "pause" pause
   stopped <-
     try $
       awaitOutcome pausing >>= \case
@@ -107,7 +107,7 @@ pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
   uninterruptibleMask_ $ do
     requestStop cause [SomeBranch pausing]
     paused <- awaitUninterruptibly (awaitOutcome pausing)
-    resumed <- branch scope (Label "pausedWhile" "resume") resume >>= awaitUninterruptibly . awaitOutcome
+    resumed <- branch scope "resume" resume >>= awaitUninterruptibly . awaitOutcome
     pure . Verdict cause $ do
       case paused of
         Failing e -> throwIO e
@@ -140,6 +140,6 @@ pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
 --
 -- @since 0.1.0.0
 stoppedWhile :: Signal Bool -> Behavior a -> Behavior a
-stoppedWhile condition act = react "stoppedWhile" (unlessNamed "condition" condition) $ \case
+stoppedWhile condition act = reactToCondition "stoppedWhile" condition $ \case
   True -> Idle
   False -> Run "branch" act

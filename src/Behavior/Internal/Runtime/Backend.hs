@@ -11,7 +11,6 @@ module Behavior.Internal.Runtime.Backend
   ) where
 
 import Control.Concurrent (ThreadId)
-import Control.Concurrent.Async (Async)
 import Control.Concurrent.STM (STM)
 import Control.Exception (SomeException)
 
@@ -34,7 +33,7 @@ data Simulator = Simulator
   -- ^ Which simulation it is.
   , isRunning :: ThreadId -> IO Bool
   -- ^ Whether this is the one thread of the simulation that runs at the moment.
-  , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO (Async ())
+  , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO ThreadId
   -- ^ Starts a thread, masked, and publishes its result when it ends. The thread is given an
   -- action to run first, in which an early cancellation is received, and a function to unmask.
   , deliver :: ThreadId -> SomeException -> IO ()

@@ -56,8 +56,8 @@ withShared signal body = do
           pure source {workers = [], view = mapView orSensorError <$> view source}
         stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
     -- The body comes first, so that its fault is the leftmost.
-    main <- branch scope (Label "withShared" "body") (body shared)
-    (_, running) <- startSensors scope "withShared" source
+    main <- branch scope "body" (body shared)
+    (_, running) <- startSensors scope source
     atomically (putTMVar sensors running)
     endedBy "body" <$> atomically (outcome main)
   closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"

@@ -12,6 +12,8 @@ module Behavior.Internal.Signal.Source
   , named
   , namedWith
   , unlessNamed
+  , orNamed
+  , openInTrace
   , conditionOfRule
 
     -- * Opening
@@ -228,25 +230,30 @@ namedWith name render signal = Signal $ \demand -> do
   -- (Also without a trace: it may begin while the source is open, in 'Behavior.Signal.withShared'.)
   pure source {view = showing name render <$> view source, names = [name]}
 
--- | The condition, whose readings include its value under this name, if there is no other name. (An
--- operator opens it, which is in a trace from its beginning or not at all.)
+-- | The condition, whose readings include its value under this name, if there is no other name.
 unlessNamed :: String -> Signal Bool -> Signal Bool
-unlessNamed name = inTrace $ \source ->
-  if null (names source) then source {view = showing name show <$> view source} else source
+unlessNamed name = Signal . openInTrace (orNamed name)
+
+-- | The same of a source.
+orNamed :: String -> Source Bool -> Source Bool
+orNamed name source = if null (names source) then source {view = showing name show <$> view source} else source
 
 -- | The condition of the rule with this number, whose readings say so.
 conditionOfRule :: Int -> Signal Bool -> Signal Bool
-conditionOfRule n = inTrace (\source -> source {view = ofRule <$> view source}) . unlessNamed ("condition " ++ show n)
+conditionOfRule n = Signal . openInTrace marked . unlessNamed ("condition " ++ show n)
  where
+  marked source = source {view = ofRule <$> view source}
   ofRule seen = seen {readings = says <$> reread seen <*> readings seen}
   says holds = map (\r -> r {readingRule = Just (n, holds)})
 
--- | The signal, whose source is changed if there is a trace when it is opened.
-inTrace :: (Source a -> Source a) -> Signal a -> Signal a
-inTrace change signal = Signal $ \demand -> do
+-- | Opens the signal; if there is a trace, changes the source. (An operator opens it, which is in a trace from its
+-- beginning or not at all.)
+openInTrace :: (Source a -> Source a) -> Signal a -> Demand a -> IO (Source a)
+openInTrace change signal demand = do
   source <- open signal demand
   traced <- isTraced
   pure $! if traced then change source else source
+{-# INLINE openInTrace #-}
 
 -- | The view whose readings include its value.
 showing :: String -> (a -> String) -> View a -> View a
@@ -259,12 +266,12 @@ type Sensors = [Branch ()]
 -- | Starts the workers of a source, and gives a view of it. The view is taken before the workers
 -- start, and so are the views that the workers use: otherwise they could miss the first
 -- reading, and have to wait for a second one.
-startSensors :: Scope -> String -> Source a -> IO (View a, Sensors)
-startSensors scope operator source = case workers source of
+startSensors :: Scope -> Source a -> IO (View a, Sensors)
+startSensors scope source = case workers source of
   [] -> (\seen -> (seen, [])) <$> atomically (view source)
   needed -> do
     (runs, seen) <- atomically ((,) <$> traverse prepare needed <*> view source)
-    running <- for (zip needed runs) $ \(w, run) -> worker scope (Label operator (workerName w)) run
+    running <- for (zip needed runs) $ \(w, run) -> branchWith plainly scope (workerName w) run
     (seen, running) <$ yieldReal
 
 -- | What a sensor has failed or faulted with, if one has (the leftmost first). A sensor that

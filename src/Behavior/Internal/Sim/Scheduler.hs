@@ -48,7 +48,7 @@ simulation n sim =
     , spawn = \name body publish -> do
         operation sim AlwaysEnabled
         me <- readIORef (current sim)
-        snd <$> launch sim (taskNumber me) name body publish
+        asyncThreadId . snd <$> launch sim (taskNumber me) name body publish
     , deliver = \target e -> withTarget target $ \me there ->
         if taskNumber there == taskNumber me
           then throwTo target e

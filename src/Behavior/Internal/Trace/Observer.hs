@@ -8,7 +8,8 @@
 module Behavior.Internal.Trace.Observer
   ( -- * Observers
     Observer
-  , observing
+  , newObserver
+  , ending
 
     -- * The named values of a signal
   , Values
@@ -55,16 +56,20 @@ data Seen = Seen
   , isReported :: !Bool
   }
 
--- | Runs an operator with this name and an observer. When the operator ends, or is interrupted, a reaction that
--- has started nothing yet is reported.
-observing :: String -> (Observer -> IO a) -> IO a
-observing operator act =
-  myPlace >>= \place -> case place of
-    Nothing -> act Silent
-    Just here -> do
-      observer <- Observer here operator <$> newIORef (Seen Nothing Nothing Nothing True)
-      act observer `finally` report observer Nothing
-{-# INLINE observing #-}
+-- | An observer of the operator with this name, which begins here.
+newObserver :: String -> IO Observer
+newObserver operator = myPlace >>= maybe (pure Silent) (observerAt operator)
+{-# INLINE newObserver #-}
+
+observerAt :: String -> Place -> IO Observer
+observerAt operator here = Observer here operator <$> newIORef (Seen Nothing Nothing Nothing True)
+{-# NOINLINE observerAt #-}
+
+-- | Runs the operator: when it ends, or is interrupted, a reaction that has started nothing yet is reported.
+ending :: Observer -> IO a -> IO a
+ending Silent act = act
+ending observer act = act `finally` report observer Nothing
+{-# INLINE ending #-}
 
 -- | The named values with which an operator decided.
 type Values = [Reading]
