@@ -118,6 +118,19 @@ spec = guarded $ do
       let tooEarly progress n act = pure () <$ (resumableFor progress n "abc" act >>= atomically >> checkpoint)
       repeatedStep (exhaustively 1) tooEarly `shouldReturn` True
 
+    it "an order of a hundred thousand steps, in constant memory" $
+      inConstantMemory 100000 $ \step -> do
+        n <- newIORef (100000 :: Int) >>= readIORef
+        progress <- newTVarIO Map.empty
+        resumableFor progress 'a' [1 .. n] (const step) >>= atomically
+
+    it "goes on with the steps with which the order began, whatever was done of them" $ do
+      progress <- newTVarIO Map.empty
+      entries <- newLog
+      let step c = note entries c >> when (c == 'x') failed
+      for_ ["xa", "yb"] $ \steps -> ending (resumableFor progress 'k' steps step >>= atomically)
+      notes entries `shouldReturn` "xx"
+
     it "a hundred thousand orders, in constant memory" $ do
       progress <- newTVarIO Map.empty
       inConstantMemory 100000 $ \step ->

@@ -14,7 +14,6 @@ import Control.Concurrent.STM (STM, TVar, modifyTVar, readTVar)
 import Control.Exception (mask)
 import Data.Map.Lazy (Map)
 import qualified Data.Map.Lazy as Map
-import Data.Maybe (fromMaybe)
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime (atomically)
@@ -36,7 +35,8 @@ import Behavior.Internal.Runtime (atomically)
 -- A behaviour that has returned is not run again for its element; one that was interrupted is, from
 -- its beginning. (With @act x >> atomically (modifyTVar left tail)@ an interruption can come in
 -- between, and the work is done twice.) An operator that is interrupted between the end of its
--- branch and its own return has not returned.
+-- branch and its own return has not returned. A behaviour that swallows its cancellation and returns
+-- has returned, and the next element follows, as in every loop.
 --
 -- [Result] None, when the list is empty. For a patrol without an end, fill it again:
 --   @forever (resumable left visit >> atomically (writeTVar left waypoints))@.
@@ -73,11 +73,12 @@ resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
 -- > resumableFor progress key steps act
 -- >   -- as resumable on a variable that holds steps at first, and that is found by its key
 --
--- A key that is not in the map has all the steps left; one that is there goes on where it was,
--- whichever robot works on it now, and whatever came in between: an interruption, a failure and a retry.
--- A key stays in the map, also when nothing is left for it, until the transaction that is returned
--- has removed it. Commit that together with what says that the whole is done: then neither is repeated,
--- whatever interrupts it in between.
+-- A key that is not in the map has all the steps left, and is added with them; one that is there goes on
+-- where it was, whichever robot works on it now, and whatever came in between: an interruption, a failure
+-- and a retry. A key stays in the map, also when nothing is left for it, until the transaction that is
+-- returned has removed it. Commit that together with what says that the whole is done: then neither is
+-- repeated, whatever interrupts it in between. Of an order that is given up, nobody else removes the key (of
+-- a message that was begun, and then dropped by a full inbox): do it with @modifyTVar progress (Map.delete key)@.
 --
 -- > handleNext orders (\order -> resumableFor progress (number order) (steps order) carryOut)
 -- > resumableFor progress key steps act >>= atomically     -- if nothing else says so
@@ -86,7 +87,8 @@ resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
 -- [Failure, fault, cancellation] As in 'resumable', which also says how to have an effect only once.
 --
 -- Two behaviours must not work on one key at the same time. The steps that are given are looked at
--- only while the key is not in the map.
+-- only when the key is not in the map: an order goes on with the steps with which it began. It runs in
+-- constant space.
 --
 -- >>> progress <- newTVarIO (Map.empty :: Map.Map Int [String])
 -- >>> tries <- newTVarIO (0 :: Int)
@@ -105,10 +107,11 @@ resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
 --
 -- @since 0.1.0.0
 resumableFor :: Ord k => TVar (Map k [a]) -> k -> [a] -> (a -> Behavior ()) -> Behavior (STM ())
-resumableFor progress key steps act = modifyTVar progress (Map.delete key) <$ goOn left drop1 act
- where
-  left = Map.findWithDefault steps key <$> readTVar progress
-  drop1 = modifyTVar progress (Map.alter (Just . drop 1 . fromMaybe steps) key)
+resumableFor progress key steps act = do
+  -- From here on only the map holds the steps: each can be collected when it is done.
+  atomically (modifyTVar progress (`Map.union` Map.singleton key steps))
+  goOn (Map.findWithDefault [] key <$> readTVar progress) (modifyTVar progress (Map.adjust (drop 1) key)) act
+  pure (modifyTVar progress (Map.delete key))
 
 -- | Runs the behaviour for each element that is left, and removes it. The transactions read what is
 -- left, and remove the first element.
