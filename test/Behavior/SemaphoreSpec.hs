@@ -4,9 +4,10 @@
 -- 'withTSem': a unit is held while the behaviour runs, and given back whatever happens.
 module Behavior.SemaphoreSpec (spec) where
 
+import Control.Concurrent (yield)
 import Control.Concurrent.Async (asyncThreadId)
 import Control.Exception
-import Control.Monad (replicateM_, void)
+import Control.Monad (replicateM_, unless, void, when)
 import Data.Foldable (for_)
 import Data.IORef
 import Test.Hspec
@@ -16,7 +17,7 @@ import Behavior
 import Behavior.Parallel (firstOf)
 import Behavior.STM
 import Behavior.Sim (Plan, exhaustively, explore, randomly)
-import Behavior.Time (timeout)
+import Behavior.Time (checkpoint, timeout)
 import Support
 import Watched
 
@@ -48,6 +49,24 @@ spec = guarded $ do
     withTSem semaphore (note entries 'b')
     notes entries `shouldReturn` "ab"
 
+  describe "With a limit on the waiting alone no unit is lost to a cancellation as it is given," $ do
+    it "under all schedules, if the grant is noted" $
+      lostUnit noted `shouldReturn` False
+    it "but one is, if it is not" $ do
+      let notNoted semaphore =
+            bracket_ (timeout 5 (atomically (waitTSem semaphore))) (atomically (signalTSem semaphore))
+      lostUnit notNoted `shouldReturn` True
+    it "on real threads, if the grant is noted" $
+      for_ [1 .. 1000 :: Int] $ \n -> do
+        semaphore <- atomically (newTSem 0)
+        withThread (noted semaphore yield) $ \caller -> do
+          replicateM_ (n `mod` 7) yield
+          atomically (signalTSem semaphore)
+          replicateM_ (n `mod` 5) yield
+          throwTo (asyncThreadId caller) (Cancel "the caller")
+          void (awaitEnd caller)
+        isFree semaphore `shouldReturn` True
+
   it "can be stopped while it waits, also where its caller is masked; then it has taken nothing" $ do
     semaphore <- atomically (newTSem 0)
     for_ [id, mask_] $ \inState -> do
@@ -58,6 +77,30 @@ spec = guarded $ do
       end `shouldBe` CancelledBy (show (Cancel "the caller"))
     atomically (signalTSem semaphore)
     withTSem semaphore (pure 'a') `shouldReturn` 'a'
+
+-- | What the documentation of 'withTSem' proposes for a limit on the waiting.
+noted :: TSem -> Behavior a -> Behavior a
+noted semaphore act = do
+  isHeld <- newTVarIO False
+  let obtain = atomically (waitTSem semaphore >> writeTVar isHeld True)
+      giveBack = atomically (readTVar isHeld >>= \is -> when is (signalTSem semaphore))
+  (timeout 5 obtain >> act) `finally` giveBack
+
+-- | Whether, in one of the schedules, a unit is lost that is given at about the moment at which the robot
+-- that waits for it is cancelled.
+lostUnit :: (TSem -> Behavior () -> Behavior ()) -> IO Bool
+lostUnit holding = do
+  found <- newIORef False
+  _ <- explore (exhaustively 1) $ \simulate' -> do
+    semaphore <- atomically (newTSem 0)
+    _ <- simulate' (holding semaphore (sleep 1) ||| (atomically (signalTSem semaphore) >> checkpoint))
+    free <- isFree semaphore
+    unless free (writeIORef found True)
+  readIORef found
+
+-- | Takes a unit if there is one.
+isFree :: TSem -> IO Bool
+isFree semaphore = atomically ((True <$ waitTSem semaphore) `orElse` pure False)
 
 -- | Behaviours share units. One fails; one is stopped, wherever it is; one is slow to stop.
 held :: Plan -> Int -> (forall a. [a] -> [a]) -> IO ()

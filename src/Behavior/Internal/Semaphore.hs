@@ -26,10 +26,15 @@ import Behavior.Internal.Runtime (atomically)
 -- [Cancellation] Passes through. It can come while the caller waits for the unit, even if that is
 --   masked; then nothing has been taken. Giving the unit back never blocks, and so nothing interrupts it.
 --
--- A robot that is to wait for only so long puts the limit around all, or takes the unit itself:
--- @bracket_ (timeout 5 (atomically (waitTSem semaphore))) (atomically (signalTSem semaphore)) act@. Of
--- several that wait, any may come next. One that holds the only unit and waits for it again, waits for
--- ever.
+-- Of several that wait, any may come next. One that holds the only unit and waits for it again, waits for
+-- ever. A robot that is to wait for only so long, and then to work as long as it takes, notes in the
+-- transaction that takes the unit that it has it. (With @bracket_ (timeout 5 ...)@ a unit would be lost that
+-- is given as the robot is cancelled.)
+--
+-- > do held <- newTVarIO False
+-- >    let obtain = atomically (waitTSem semaphore >> writeTVar held True)
+-- >        giveBack = atomically (readTVar held >>= \is -> when is (signalTSem semaphore))
+-- >    (timeout 5 obtain >> act) `finally` giveBack
 --
 -- >>> arm <- atomically (newTSem 1)
 -- >>> both (withTSem arm (putStrLn "grip")) (withTSem arm failed) ? putStrLn "drop"
