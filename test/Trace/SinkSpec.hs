@@ -2,13 +2,15 @@
 -- Sinks: what they receive, and that they cost the behaviour nothing when they block or throw.
 module Trace.SinkSpec (spec) where
 
+import Control.Concurrent (myThreadId)
 import Control.Concurrent.MVar
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception
-import Control.Monad (replicateM_, when)
+import Control.Monad (replicateM_, void, when)
 import Data.Foldable (for_)
 import Data.IORef
 import GHC.Conc (getUncaughtExceptionHandler, setUncaughtExceptionHandler)
+import System.IO.Unsafe (unsafePerformIO)
 import Test.Hspec
 
 import Behavior
@@ -47,16 +49,40 @@ receiving = do
     withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] $ do
       named (cycle "long ") (pure ())
       named (throw (Fault "no name")) (pure ())
+      named ("of a type that is asynchronous: " ++ throw ThreadKilled) (pure ())
+      named (throw StackOverflow) (pure ())
     names <- reverse <$> readIORef seen
     let found = [spanName s | Began s <- names]
     map (take 5) (take 1 found) `shouldBe` ["long "]
     map length (take 1 found) `shouldSatisfy` all (< 20000)
-    drop 1 found `shouldBe` ["<its text throws an exception>"]
+    drop 1 found
+      `shouldBe` [ "<its text throws an exception>"
+                 , "of a type that is asynchronous: <its text throws an exception>"
+                 , "<its text throws an exception>"
+                 ]
+
+  it "can be cancelled: what is thrown to it while it evaluates a text, is not taken for what the text throws" $ do
+    thread <- newEmptyMVar
+    entered <- newEmptyMVar
+    mayGo <- newEmptyMVar
+    let slow = unsafePerformIO (putMVar entered () >> readMVar mayGo)
+    seen <- newIORef []
+    reporting $ \reports -> do
+      withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :) >> void (myThreadId >>= tryPutMVar thread))] $ do
+        named "first" (pure ())
+        sink <- readMVar thread
+        named slow (takeMVar entered >> throwing sink (Cancel "the sink"))
+        putMVar mayGo "slow"
+      told <- reports
+      [show thrown | SinkThrew thrown <- told] `shouldBe` [show (Cancel "the sink")]
+    names <- readIORef seen
+    [spanName s | Began s <- names] `shouldBe` ["first"]
 
   it "receives a reaction, whatever the names of its signals and the texts of their values are" $
     for_
       [ (throw (Fault "no text"), "<its text")
       , ('a' : throw (Fault "no text"), "a<its text")
+      , (throw ThreadKilled, "<its text")
       , (cycle "ab", "abab")
       ]
       $ \(text, expected) -> do

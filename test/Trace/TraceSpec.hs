@@ -74,6 +74,15 @@ naming = do
     plain <- try locked
     either failurePath (\() -> ["none"]) plain `shouldBe` []
 
+  it "can be shown with its path, whatever the texts of the names are" $
+    for_ [(throw (Fault "no name"), "<its text"), ('b' : throw ThreadKilled, "b<its text"), (cycle "b", "bbbb")] $
+      \(name, expected) -> do
+        failure <- try (withTrace [] (named "a" (named name (failWith "locked"))))
+        for_ (either (\e -> [show e, displayException (e :: BehaviorFailed)]) (\() -> []) failure) $ \text -> do
+          text `shouldStartWith` ("a > " ++ expected)
+          text `shouldContain` ": "
+          text `shouldContain` "locked"
+
   it "adds the path also to what a branch, or a time limit, fails with" $ do
     seen <- try (withTrace [] (named "a" (both hang (named "b" failed))))
     either failurePath (\() -> []) seen `shouldBe` ["a", "b"]

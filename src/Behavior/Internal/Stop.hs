@@ -24,6 +24,7 @@ import Control.Exception
   )
 
 import Behavior.Internal.Failure (BehaviorFailed (..), StoppedWithFault (..), isCancellation)
+import Behavior.Internal.SafeText (settledText)
 import Behavior.Internal.Trace.Event (Cause (..), End (..))
 
 -- | The exception by which an operator requests the stop of a branch, and why it does. It names
@@ -64,8 +65,9 @@ endOf = either (\e -> try (evaluate (kind e)) >>= either undefinedException pure
 displayed :: SomeException -> String
 displayed (SomeException e) = displayException e
 
--- | The exception; with this path, if it is a failure that has none yet.
+-- | The exception; with this path, if it is a failure that has none yet. (The names are users' texts, and
+-- the exception will be shown.)
 atPath :: [String] -> SomeException -> SomeException
 atPath path e = case fromException e of
-  Just (BehaviorFailed [] failure) -> toException (BehaviorFailed path failure)
+  Just (BehaviorFailed [] failure) -> toException (BehaviorFailed (map settledText path) failure)
   _ -> e
