@@ -186,7 +186,7 @@ watchingThreads f act = do
   here <- myPlace
   let receiver = Receiver {firstNumber = 1, needsDetail = True, receiveEvent = traverse_ f . threadEvent}
   whole <- withReceiver receiver <$> maybe (newTrace (pure 0)) (pure . trace) here
-  let inside = maybe (top whole Trace.Top) (\place -> place {trace = whole}) here
+  let inside = maybe (placeIn [] whole) (\place -> place {trace = whole}) here
   mask $ \restore -> withLiveTrace whole (inPlace (Just inside) (restore act))
  where
   threadEvent = \case

@@ -24,7 +24,7 @@ import Data.IORef
 import Behavior.Internal.Failure (Behavior, BehaviorFailed (..), StoppedWithFault (..), isCancellation)
 import qualified Behavior.Internal.Signal.Source as Signal
 import Behavior.Internal.Trace.Event (Event)
-import Behavior.Internal.Trace.Place hiding (Position)
+import Behavior.Internal.Trace.Place hiding (around)
 import Behavior.Internal.Trace.Span (named)
 import Behavior.Sim (Run (events), Schedule)
 import Semantics.Path (Seen)

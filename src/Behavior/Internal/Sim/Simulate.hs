@@ -32,8 +32,8 @@ import Behavior.Internal.Sim.Scheduler
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Sim.Watchdog
-import Behavior.Internal.Trace.Event (Parent (Top), traverseTexts)
-import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, top, withReceiver)
+import Behavior.Internal.Trace.Event (traverseTexts)
+import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, placeIn, withReceiver)
 
 -- $setup
 -- >>> import Behavior
@@ -96,7 +96,7 @@ simulateBy o chooser' act = do
   result <- newIORef Nothing
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
   sim <- newSim o chooser'
-  root <- (`top` Top) <$> traceOf sim
+  root <- placeIn [] <$> traceOf sim
   mask $ \restore -> withBackend n (simulation n sim) . watched n sim $ do
     let run unmasked = try (inPlace (Just root) unmasked) >>= writeIORef result . Just
     (main, _) <- launch sim (-1) (Label "main" "") (\begin unmask -> run (unmask (begin >> act))) (const (pure ()))

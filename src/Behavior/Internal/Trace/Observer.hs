@@ -167,9 +167,7 @@ startsObserved observer@(Observer here _ cell) name act = do
   writeIORef cell seen {running = Just (name, t)}
   case reaction seen of
     Nothing -> act
-    Just reacted ->
-      let after position = position {startedBy = Just (reactionNumber reacted)}
-       in mask_ (inPlace (Just here {amongNamed = after (amongNamed here), amongAll = after (amongAll here)}) act)
+    Just reacted -> mask_ (inPlace (Just here {around = InBranchOf (reactionNumber reacted) : around here}) act)
 {-# NOINLINE startsObserved #-}
 
 -- | The operator waits for another value.

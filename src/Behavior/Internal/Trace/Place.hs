@@ -11,9 +11,9 @@
 module Behavior.Internal.Trace.Place
   ( -- * Places
     Place (..)
-  , Position (..)
+  , Around (..)
   , Open (..)
-  , top
+  , placeIn
   , inPath
   , myPlace
   , placeOf
@@ -51,9 +51,8 @@ import Behavior.Internal.Trace.Event
 -- | Where a thread is in the tree of spans.
 data Place = Place
   { trace :: !Trace
-  , amongNamed :: !Position
-  -- ^ Its position, where only spans with names count.
-  , amongAll :: !Position
+  , around :: [Around]
+  -- ^ What it is in, the innermost first.
   , path :: [String]
   -- ^ The names of the spans around it, the innermost first.
   , abandonable :: [IORef (Maybe (IntMap Open))]
@@ -61,11 +60,14 @@ data Place = Place
   -- nothing once it has been abandoned.
   }
 
--- | A position in the tree: the span around it, and the reaction that started the branch.
-data Position = Position
-  { insideOf :: !Parent
-  , startedBy :: !(Maybe Int)
-  }
+-- | What a place is in. A receiver that needs no operators and branches does not see their spans.
+data Around
+  = -- | In the span with this number.
+    InSpan !SpanKind !Int
+  | -- | In the branch that the reaction with this number started.
+    InBranchOf !Int
+  | -- | In what is unknown.
+    InUnknown
 
 -- | A span that has begun.
 data Open = Open
@@ -110,11 +112,9 @@ withReceiver :: Receiver -> Trace -> Trace
 withReceiver receiver t =
   t {receivers = receiver : receivers t, recordsDetail = needsDetail receiver || recordsDetail t}
 
--- | The place at the top of a trace.
-top :: Trace -> Parent -> Place
-top t parent = Place {trace = t, amongNamed = position, amongAll = position, path = [], abandonable = []}
- where
-  position = Position {insideOf = parent, startedBy = Nothing}
+-- | The place in these spans of a trace, in which no name is known.
+placeIn :: [Around] -> Trace -> Place
+placeIn spans t = Place {trace = t, around = spans, path = [], abandonable = []}
 
 -- | The names of the spans around a place, in parentheses, for a thread's label. (Users' code computes
 -- the names: they may be infinite, or throw.)

@@ -38,7 +38,7 @@ import Behavior.Internal.Runtime.OsSleep (osSleep)
 import Behavior.Internal.SafeText (safeShow, settledText)
 import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Internal.Trace.Event
-import Behavior.Internal.Trace.Place (inPlace, newTrace, top)
+import Behavior.Internal.Trace.Place (inPlace, newTrace, placeIn)
 import Behavior.Internal.Trace.Text (plainLine)
 
 -- | What receives the events of a trace, in the order in which they were emitted. It runs in a thread
@@ -113,7 +113,7 @@ start n destination = do
     labelThread self ("withTrace: sink " ++ show n)
     -- What the sink itself does is in a trace without sinks: its events would never end.
     nowhere <- newTrace (Seconds <$> getMonotonicTime)
-    try (inPlace (Just (top nowhere Top)) (unmask (drain running destination))) >>= \case
+    try (inPlace (Just (placeIn [] nowhere)) (unmask (drain running destination))) >>= \case
       Left e -> close running >> notify (SinkThrew e)
       Right () -> pure ()
     add threads (-1)

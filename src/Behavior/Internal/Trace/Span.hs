@@ -79,7 +79,7 @@ actionSpan name act = isTraced >>= \traced -> if traced then spanned (\_ -> pure
 spanned :: (String -> IO ()) -> (Place -> SomeException -> SomeException) -> String -> Behavior a -> Behavior a
 spanned noting change name act =
   myPlace >>= \case
-    Nothing -> newestTrace >>= maybe act (\t -> inside (top t UnknownParent))
+    Nothing -> newestTrace >>= maybe act (\t -> inside (placeIn [InUnknown] t))
     Just place -> inside place
  where
   inside place = mask $ \restore -> do
@@ -139,7 +139,7 @@ register :: Open -> IO Open
 register open = do
   inAll <- for (abandonable place) $ \spans ->
     atomicModifyIORef' spans (\known -> (IntMap.insert (openNumber open) open <$> known, isJust known))
-  pure (if and inAll then open else open {openAt = (top (trace place) UnknownParent) {path = path place}})
+  pure (if and inAll then open else open {openAt = (placeIn [InUnknown] (trace place)) {path = path place}})
  where
   place = openAt open
 
@@ -162,12 +162,10 @@ oneAtATime t report = uninterruptibleMask_ (withMVar (abandonLock t) (const repo
 
 -- | The place in a span.
 within :: Open -> Place
-within open = case openKind open of
-  Named -> place {amongNamed = position, amongAll = position, path = openName open : path place}
-  _ -> place {amongAll = position}
+within open = inside {path = [openName open | openKind open == Named] ++ path place}
  where
   place = openAt open
-  position = Position {insideOf = Inside (openNumber open), startedBy = Nothing}
+  inside = place {around = InSpan (openKind open) (openNumber open) : around place}
 
 -- | Reports the end of a span, unless that was done.
 endSpan :: End -> Open -> IO ()
@@ -187,19 +185,30 @@ reportSpan event open = for_ (receivers (trace place)) $ \receiver ->
       , spanName = openName open
       , spanBegan = openSince open
       , spanReaction =
-          startedBy (positionFor receiver place) >>= \n -> if n < firstNumber receiver then Nothing else Just n
+          reactionFor receiver place
       }
  where
   place = openAt open
 
 -- | The span around a place, for a receiver.
 parentFor :: Receiver -> Place -> Parent
-parentFor receiver place = case insideOf (positionFor receiver place) of
-  Inside n | n < firstNumber receiver -> Top
-  parent -> parent
+parentFor receiver place = case [span' | span' <- around place, isSeenBy receiver span'] of
+  InSpan _ n : _ | n >= firstNumber receiver -> Inside n
+  InUnknown : _ -> UnknownParent
+  InBranchOf _ : outer -> parentFor receiver place {around = outer}
+  _ -> Top
 
-positionFor :: Receiver -> Place -> Position
-positionFor receiver = if needsDetail receiver then amongAll else amongNamed
+-- | The reaction that started the branch which a place is in, unless it is in a span there, for a receiver.
+reactionFor :: Receiver -> Place -> Maybe Int
+reactionFor receiver place = case filter (isSeenBy receiver) (around place) of
+  InBranchOf n : _ | n >= firstNumber receiver -> Just n
+  _ -> Nothing
+
+-- | Whether a receiver sees it: not if it is the span of an operator or branch, and the receiver needs none.
+isSeenBy :: Receiver -> Around -> Bool
+isSeenBy receiver = \case
+  InSpan kind _ -> kind == Named || needsDetail receiver
+  _ -> True
 
 -- | Passes an event to the receivers of the trace.
 reportEach :: Place -> (Receiver -> Event) -> IO ()

@@ -22,7 +22,6 @@ import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime.Backend (Simulator (lookAtClock))
 import Behavior.Internal.Runtime.Dispatch (inSimulation)
 import Behavior.Internal.Seconds (Seconds (..), duration)
-import Behavior.Internal.Trace.Event (Parent (Top))
 import Behavior.Internal.Trace.Place
 import Behavior.Internal.Trace.Sink (Sink)
 import qualified Behavior.Internal.Trace.Sink as Sink
@@ -83,8 +82,8 @@ withTraceOptions :: TraceOptions -> [Sink] -> Behavior a -> Behavior a
 withTraceOptions options sinks act = do
   limit <- duration "withTrace: waitAtEnd" (waitAtEnd options)
   _ <- evaluate (length sinks) -- what that throws must not come when some have been started
-  around <- myPlace
-  outer <- case around of
+  outside <- myPlace
+  outer <- case outside of
     Nothing -> inSimulation (pure (Seconds <$> getMonotonicTime)) (pure . lookAtClock) >>= newTrace
     Just place -> pure (trace place)
   before <- readIORef (lastNumber outer)
@@ -97,7 +96,7 @@ withTraceOptions options sinks act = do
             , receiveEvent = Sink.emit (queueLimit options) r
             }
         whole = foldr (withReceiver . receiver) outer running
-        here = maybe (top whole Top) (\place -> place {trace = whole}) around
+        here = maybe (placeIn [] whole) (\place -> place {trace = whole}) outside
         inTrace = inPlace (Just here) (restore act)
     end <- try (inSimulation (withLiveTrace whole inTrace) (const inTrace))
     uninterruptibleMask_ (Sink.end limit running)
