@@ -2,6 +2,7 @@
 -- Tests that would pass because they test nothing: each is an error that says what to do.
 module Sim.VacuousSpec (spec) where
 
+import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception (ErrorCall (..))
 import Control.Monad (void, when)
 import Data.Foldable (for_)
@@ -11,10 +12,12 @@ import Test.Hspec hiding (parallel)
 import Test.QuickCheck (Args (chatty), Result (output), quickCheckWithResult, stdArgs, (==>))
 
 import Behavior
+import Behavior.Message (onMessage, withInbox)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
 import Behavior.Sim.QuickCheck (underSchedules)
+import Behavior.Time (atomically, cleanupWithin, timeout, timeoutAt)
 import Behavior.Trace (named)
 import Support (guarded)
 
@@ -114,11 +117,11 @@ coverage = do
   it "names the scripted actions that no schedule has started" $ do
     report <- exploring (\drive _ _ -> drive)
     reportNeverStarted report `shouldBe` ["charge", "honk"]
-    show report `shouldContain` "; none of them started \"charge\", \"honk\""
+    show report `shouldContain` "; never started: \"charge\", \"honk\""
   it "names none, when each has been started under some schedule, with any argument" $ do
     report <- exploring (\drive honk charge -> (drive ||| honk) >> charge 'x')
     reportNeverStarted report `shouldBe` []
-    show report `shouldNotContain` "none"
+    show report `shouldNotContain` "never"
   it "knows an action that only some schedules start" $ do
     -- The right branch honks, unless it is stopped before.
     report <- exploring (\_ honk _ -> parallel (pure ()) honk)
@@ -134,7 +137,69 @@ coverage = do
       named "mission" (Signal.teleoReactive [(pure False, honk), (pure True, drive)] ||| sleep 4)
     reportStarted report
       `shouldBe` ["drive", "mission", "parallel: left", "parallel: right", "teleoReactive: rule 2"]
+  for_ branches $ \(mission, unreached) ->
+    it ("names the branches that no schedule has started: " ++ unwords unreached) $ do
+      report <- explore (randomly 3 `endingAt` 9) (\simulated -> void (simulated mission))
+      reportNeverStarted report `shouldBe` unreached
+  it "knows a rule and a recovery that only some schedules start" $ do
+    report <- explore (randomly 50) $ \simulated -> void . simulated $ do
+      first <- newTVarIO True
+      let isFirst = Signal.watching (readTVar first)
+          rules = Signal.teleoReactive [(isFirst, sleep 1), (not <$> isFirst, pure ())]
+      both (atomically (writeTVar first False)) (both rules (Signal.monitor isFirst (sleep 1) (pure ())))
+    reportNeverStarted report `shouldBe` []
+  it "tells operators apart by the names of the behaviours around them" $ do
+    let charging = Signal.monitor (pure False) (pure ()) (pure ())
+        stopping low = Signal.insteadWhen (pure low) (pure ()) (pure ())
+    report <- explore (randomly 3) $ \simulated ->
+      void . simulated . named "mission" $
+        charging >> named "out" (stopping True >> charging) >> both (named "home" (stopping False)) charging
+    reportNeverStarted report
+      `shouldBe` [ "monitor: recovery (mission)"
+                 , "insteadWhen: emergency (mission > home)"
+                 , "insteadWhen: branch (mission > out)"
+                 , "monitor: recovery (mission > out)"
+                 ]
+    show report `shouldContain` "; never started: \"monitor: recovery (mission)\", "
+  it "names a branch once, however often its operator runs, and however deep a name is repeated" $ do
+    let rounds n = when (n > (0 :: Int)) . named "round" $ Signal.monitor (pure False) nop nop >> rounds (n - 1)
+    report <- explore (randomly 3) (\simulated -> void (simulated (rounds 20)))
+    reportNeverStarted report `shouldBe` ["monitor: recovery (round)"]
+  it "survives names that throw or have no end" $ do
+    let unreached name = named name (Signal.monitor (pure False) (pure ()) (pure ()))
+    report <- explore (randomly 3) $ \simulated ->
+      void (simulated (unreached (error "no name") >> unreached (cycle "ab")))
+    map (take 30) (reportNeverStarted report)
+      `shouldBe` ["monitor: recovery (<its text t", "monitor: recovery (abababababa"]
+  it "names no branch of an operator that no schedule has started" $ do
+    report <- explore (randomly 3) $ \simulated ->
+      void (simulated (Signal.rSelect (pure True) (pure ()) (Signal.monitor (pure False) (pure ()) (pure ()))))
+    reportNeverStarted report `shouldBe` ["rSelect: right"]
+  it "counts one schedule as one" $ do
+    report <- explore (replaying NonPreemptive) (\simulated -> void (simulated (pure ())))
+    show report `shouldBe` "1 schedule of 1 point in all"
  where
+  branches =
+    [ (Signal.rSelect (pure True) (pure ()) (pure ()), ["rSelect: right"])
+    , (Signal.rSelect (pure False) (pure ()) (pure ()), ["rSelect: left"])
+    , (Signal.monitor (pure False) (pure ()) (pure ()), ["monitor: recovery"])
+    , (Signal.monitor (pure True) (sleep 1) (pure ()), ["monitor: task"])
+    , (monitor (pure False) (pure ()) (pure ()), ["monitor: recovery"])
+    , (Signal.insteadWhen (pure False) (pure ()) (pure ()), ["insteadWhen: emergency"])
+    , (Signal.insteadWhen (pure True) (pure ()) (pure ()), ["insteadWhen: branch"])
+    , ( Signal.teleoReactive [(pure False, nop), (pure True, nop), (pure True, nop)]
+      , ["teleoReactive: rule 1", "teleoReactive: rule 3"]
+      )
+    , (Signal.whileHolding (pure False) (pure ()), ["whileHolding: branch"])
+    , (Signal.stoppedWhile (pure True) (pure ()), ["stoppedWhile: branch"])
+    , (Signal.pausedWhile (pure False) (pure ()) (pure ()) (pure ()), ["pausedWhile: pause"])
+    , (withInbox 1 (\_ -> pure nop) (\inbox -> onMessage inbox (\() -> pure (pure ())) nop), ["onMessage: handler"])
+    , (timeout 0 (pure ()), ["timeout: branch"])
+    , (timeoutAt 0 (pure ()), ["timeoutAt: branch"])
+    , (void (cleanupWithin 0 (pure ())), ["cleanupWithin: branch"])
+    , (Signal.switch (pure 'x') (const nop) >> timeout 1 (sleep 2) ? Signal.waitUntil (pure True) >> (nop ||| nop), [])
+    ]
+  nop = pure () :: Behavior ()
   exploring mission = explore (randomly 20) $ \simulated -> do
     (world, drive, _) <- rover
     honk <- action world "honk" [succeeds]

@@ -155,10 +155,11 @@ namedInboxWith name render inbox = inbox {called = Just (name, render)}
 --
 -- @since 0.1.0.0
 onMessage :: Inbox e -> (e -> Behavior (STM ())) -> Behavior a -> Behavior a
-onMessage inbox handle task = react "onMessage" ((> 0) <$> counting "waiting" inbox (queued inbox)) $ \case
+onMessage inbox handle task = react "onMessage" [False, True] someWait $ \case
   True -> RunToEnd "handler" (BeginAgain <$ handleIfAny)
   False -> Run "task" task
  where
+  someWait = (> 0) <$> counting "waiting" inbox (queued inbox)
   -- (Something else may have taken it meanwhile.)
   handleIfAny = mask $ \restore -> atomically (tryTake inbox) >>= traverse_ (handleTaken inbox (restore . handle))
 

@@ -91,7 +91,7 @@ import Behavior.Internal.Runtime.Dispatch
 import Behavior.Internal.Runtime.Fork
 import qualified Behavior.Internal.Runtime.TimerWheel as Timer
 import Behavior.Internal.Seconds
-import Behavior.Internal.Trace.Place (Place, inPath, myPlace)
+import Behavior.Internal.Trace.Place (Place (path), inPath, myPlace)
 import Behavior.Internal.Trace.Span (branchSpan)
 
 -- | A thread that the library has started, and what it publishes as it ends.
@@ -174,7 +174,8 @@ runThread here label act = do
 labelSelf :: Maybe Place -> Label -> IO ()
 labelSelf here label =
   uninterruptibleMask_ $
-    (myThreadId >>= \self -> labelThread self (show label ++ inPath here)) `catch` \(_ :: SomeException) -> pure ()
+    (myThreadId >>= \self -> labelThread self (show label ++ inPath (maybe [] path here)))
+      `catch` \(_ :: SomeException) -> pure ()
 {-# NOINLINE labelSelf #-}
 
 -- | Whether labels are visible anywhere. Before GHC 9.6 only an event log shows them,
@@ -363,9 +364,11 @@ reportUncaught e =
 isRecorded :: IO Bool
 isRecorded = inSimulation (pure True) recording
 
--- | Passes the names of scripted actions to the simulation, which can start them.
-announce :: [String] -> IO ()
-announce actions = inSimulation (pure ()) (`recordScripted` actions)
+-- | Passes to the simulation what an operator with this name, which begins here, can start. (@""@: the
+-- scripted actions of a world.)
+announce :: String -> [String] -> IO ()
+announce operator branches = inSimulation (pure ()) (\simulation -> recordStartable simulation operator branches)
+{-# INLINE announce #-}
 
 -- | The simulation that the calling thread is part of: its number, and how to read its clock, later too.
 simulatedRun :: IO (Maybe (Int, IO Seconds))

@@ -156,7 +156,7 @@ register mock kind name = do
   announceActions [(name, kind)]
 
 announceActions :: [(String, SubjectKind)] -> IO ()
-announceActions these = announce [name | (name, kind) <- these, kind `elem` anyAction]
+announceActions these = announce "" [name | (name, kind) <- these, kind `elem` anyAction]
 
 -- | Registers how to find the changes of a condition that are due by a given time but not
 -- recorded yet.

@@ -17,7 +17,7 @@ import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime (atomically, tryReadThenBlock)
+import Behavior.Internal.Runtime (announce, atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
 import Behavior.Internal.Trace.Event (Cause (..))
@@ -33,6 +33,13 @@ data Reaction a
     Idle
   | -- | End the operator: for this cause, or because the signal has this value.
     Conclude (Maybe Cause) (IO a)
+
+-- | The name of the branch that it starts.
+branchOf :: Reaction a -> Maybe String
+branchOf = \case
+  Run name _ -> Just name
+  RunToEnd name _ -> Just name
+  _ -> Nothing
 
 -- | What follows a branch that has run to its end.
 data Next a = BeginAgain | EndWith a
@@ -51,16 +58,17 @@ data Wakeup k a
   | SensorDied SomeException
 
 -- | Runs the reaction to the signal's value, and changes to another reaction when the value
--- changes.
-react :: Eq k => String -> Signal k -> (k -> Reaction a) -> Behavior a
+-- changes. The list has the values whose branches a simulation is to expect.
+react :: Eq k => String -> [k] -> Signal k -> (k -> Reaction a) -> Behavior a
 react = reactNaming id
 
 -- | The same for a condition, which a trace shows under the name \"condition\" if it has none.
 reactToCondition :: String -> Signal Bool -> (Bool -> Reaction a) -> Behavior a
-reactToCondition = reactNaming (orNamed "condition")
+reactToCondition name = reactNaming (orNamed "condition") name [False, True]
 
-reactNaming :: Eq k => (Source k -> Source k) -> String -> Signal k -> (k -> Reaction a) -> Behavior a
-reactNaming naming name signal toReaction = do
+reactNaming :: Eq k => (Source k -> Source k) -> String -> [k] -> Signal k -> (k -> Reaction a) -> Behavior a
+reactNaming naming name expected signal toReaction = do
+  announce name [next | k <- expected, Just next <- [branchOf (toReaction k)]]
   -- (No branch has been started yet: what 'open' throws is simply thrown.)
   opened <- openInTrace naming (suppressEqual signal) everyValue
   structured name $ \within -> do

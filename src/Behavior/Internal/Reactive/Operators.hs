@@ -143,7 +143,7 @@ insteadWhen condition emergency act = reactToCondition "insteadWhen" condition $
 --
 -- @since 0.1.0.0
 switch :: Eq k => Signal k -> (k -> Behavior a) -> Behavior a
-switch signal behavior = react "switch" signal (Run "branch" . behavior)
+switch signal behavior = react "switch" [] signal (Run "branch" . behavior)
 
 -- | Ordered rules: always runs the first behaviour whose condition holds; while
 -- none holds, it waits.
@@ -163,7 +163,7 @@ switch signal behavior = react "switch" signal (Run "branch" . behavior)
 --
 -- @since 0.1.0.0
 teleoReactive :: [(Signal Bool, Behavior a)] -> Behavior a
-teleoReactive rules = react "teleoReactive" firstHolding $ \case
+teleoReactive rules = react "teleoReactive" (map Just [0 .. length rules - 1]) firstHolding $ \case
   Nothing -> Idle
   Just n -> Run ("rule " ++ show (n + 1)) (snd (rules !! n))
  where
@@ -200,7 +200,7 @@ waitUntil condition = reactToCondition "waitUntil" condition $ \case
 --
 -- @since 0.1.0.0
 whileHolding :: Signal Bool -> Behavior a -> Behavior a
-whileHolding condition behavior = react "whileHolding" (orReason condition) $ \case
+whileHolding condition behavior = react "whileHolding" [Nothing] (orReason condition) $ \case
   Nothing -> Run "branch" behavior
   Just reason -> Conclude Nothing (failWith reason)
 

@@ -71,7 +71,7 @@ import Behavior.Internal.Trace.Event (Cause (..))
 --
 -- @since 0.1.0.0
 pausedWhile :: Signal Bool -> Behavior () -> Behavior () -> Behavior a -> Behavior a
-pausedWhile condition pause resume act = react "pausedWhile" beginning $ \() -> Run "branch" act
+pausedWhile condition pause resume act = react "pausedWhile" [()] beginning $ \() -> Run "branch" act
  where
   -- It has its value when the condition was false for the first time; meanwhile, and from then on, the
   -- pauses are its sensor.
@@ -81,7 +81,7 @@ pausedWhile condition pause resume act = react "pausedWhile" beginning $ \() -> 
       (fromView (pure (constantView (readTVar begun >>= check))))
         { workers = [Worker "pauses" (pure (\_ -> pauses begun))]
         }
-  pauses begun = react "pausedWhile" (phases begun) $ \case
+  pauses begun = react "pausedWhile" [Just True] (phases begun) $ \case
     Just True -> Run "pause" (pauseThenResume pause resume)
     _ -> Idle
   phases begun = Signal $ \_ -> do

@@ -56,7 +56,7 @@ import Behavior.Internal.Trace.Event (Cause (..))
 timeout :: Seconds -> Behavior a -> Behavior a
 timeout seconds behavior = do
   limit <- duration "timeout" seconds
-  react "timeout" (elapsed limit) $ \case
+  react "timeout" [False] (elapsed limit) $ \case
     True -> Conclude (Just (TimeLimit limit)) (throwIO (TimedOut limit))
     False -> Run "branch" behavior
 
@@ -91,7 +91,7 @@ timeoutAt :: Seconds -> Behavior a -> Behavior a
 timeoutAt seconds behavior = do
   end <- moment "timeoutAt" seconds
   limit <- (\t -> max 0 (end - t)) <$> now
-  react "timeoutAt" (reached end limit) $ \case
+  react "timeoutAt" [False] (reached end limit) $ \case
     True -> Conclude (Just (TimeLimit limit)) (throwIO (TimedOut limit))
     False -> Run "branch" behavior
 
@@ -134,7 +134,7 @@ instance Exception TimedOut where
 cleanupWithin :: Seconds -> Behavior a -> Behavior (Maybe a)
 cleanupWithin seconds behavior = uninterruptibleMask_ $ do
   limit <- duration "cleanupWithin" seconds
-  react "cleanupWithin" (elapsed limit) $ \case
+  react "cleanupWithin" [False] (elapsed limit) $ \case
     True -> Conclude (Just (TimeLimit limit)) (pure Nothing)
     False -> Run "branch" (Just <$> behavior)
 

@@ -55,6 +55,7 @@ data Simulator = Simulator
   -- ^ Adds to the record that the calling thread starts.
   , recordNote :: String -> IO ()
   -- ^ Adds a text to the record.
-  , recordScripted :: [String] -> IO ()
-  -- ^ Adds the names of scripted actions that the run can start.
+  , recordStartable :: String -> [String] -> IO ()
+  -- ^ Adds what an operator with this name, which begins here, can start. (@""@: the scripted actions of a
+  -- world.)
   }

@@ -5,42 +5,117 @@
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Coverage
-  ( Coverage
+  ( -- * One run
+    Reached
+  , nothingYet
+  , canStart
+  , starts
+
+    -- * Many runs
+  , Coverage
   , nothing
   , withRun
   , started
   , neverStarted
   ) where
 
-import Data.List (foldl', isPrefixOf)
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
+import Data.List (foldl', group, isPrefixOf)
+import Data.Map.Strict (Map)
+import qualified Data.Map.Strict as Map
 import Data.Set (Set)
 import qualified Data.Set as Set
 
+import Behavior.Internal.Runtime.Backend (Label (..))
+import Behavior.Internal.SafeText (settledText)
 import Behavior.Internal.Trace.Event
+import Behavior.Internal.Trace.Place (Around (..), Place (..), inPath)
 
--- | The names of what was started, and of the scripted actions.
-data Coverage = Coverage !(Set String) !(Set String)
+-- | What a run can start, in each span with a name, by the span's number (0: in none).
+type Reached = IntMap Inner
+
+-- | The names around it, the innermost first; and of each operator, which branches it can start, and whether it
+-- has. (Scripted actions are those of no operator, and in no span: such an action is the same one wherever it runs.)
+data Inner = Inner [String] !Operators
+
+type Operators = Map String (Map String Bool)
+
+-- | At the beginning of a run.
+nothingYet :: Reached
+nothingYet = IntMap.empty
+
+-- | With what this operator can start here.
+canStart :: String -> [String] -> Maybe Place -> Reached -> Reached
+canStart operator branches here reached
+  | all (`Map.member` before) branches = reached
+  | otherwise = IntMap.insert number (Inner names (Map.insert operator (Map.union before new) inside)) reached
+ where
+  (number, names) = if null operator then (0, []) else innermost here
+  inside = operatorsIn number reached
+  before = Map.findWithDefault Map.empty operator inside
+  new = Map.fromList (map (\branch -> (branch, False)) branches)
+
+-- | With this branch, which is started here.
+starts :: Label -> Maybe Place -> Reached -> Reached
+starts (Label operator branch) here reached = case Map.lookup operator inside of
+  Just branches
+    | Just False <- Map.lookup branch branches ->
+        IntMap.insert number (Inner names (Map.insert operator (Map.insert branch True branches) inside)) reached
+  _ -> reached
+ where
+  (number, names) = innermost here
+  inside = operatorsIn number reached
+
+operatorsIn :: Int -> Reached -> Operators
+operatorsIn number = maybe Map.empty (\(Inner _ inside) -> inside) . IntMap.lookup number
+
+-- | The innermost span with a name around a place: its number, and the names.
+innermost :: Maybe Place -> (Int, [String])
+innermost here = case here of
+  Just Place {around = spans, path = names} | n : _ <- [n | InSpan Named n <- spans] -> (n, names)
+  _ -> (0, [])
+
+-- | The names of what was started; and of what can be, whether it was, by the names around it, the outermost
+-- first.
+data Coverage = Coverage !(Set String) !(Map [String] Operators)
 
 -- | That of no run.
 nothing :: Coverage
-nothing = Coverage Set.empty Set.empty
+nothing = Coverage Set.empty Map.empty
 
 -- | With that of a further run.
-withRun :: [Event] -> [String] -> Coverage -> Coverage
-withRun happened actions (Coverage known scripted) =
-  Coverage (foldl' add known [spanName s | Began s <- happened, spanKind s /= Operator]) (foldl' add scripted actions)
+withRun :: [Event] -> Reached -> Coverage -> Coverage
+withRun happened reached (Coverage known could) =
+  Coverage
+    (foldl' add known [spanName s | Began s <- happened, spanKind s /= Operator])
+    (foldl' join could reached)
  where
   -- A name is evaluated, so that it does not keep its run in memory.
   add names name
     | Set.member name names = names
-    | otherwise = length name `seq` Set.insert name names
+    | otherwise = Set.insert (settledText name) names
+  -- (A behaviour that runs itself inside of itself is one.)
+  join before (Inner names inside) =
+    let outside = map head (group (reverse (map (take 100 . settledText) names)))
+        old = Map.findWithDefault Map.empty outside before
+     in if Map.isSubmapOfBy (Map.isSubmapOfBy (<=)) inside old
+          then before
+          else Map.insert outside (Map.unionWith (Map.unionWith (||)) old inside) before
 
 -- | The names of all that was started: behaviours that have a name, scripted actions, and branches.
 started :: Coverage -> [String]
 started (Coverage known _) = Set.toAscList known
 
--- | The names of the scripted actions that no run has started, with no argument if they have one.
+-- | The names of what no run has started: scripted actions, with no argument if they have one; and branches,
+-- with the names around them.
 neverStarted :: Coverage -> [String]
-neverStarted (Coverage known scripted) = filter (not . wasStarted) (Set.toAscList scripted)
+neverStarted (Coverage known could) =
+  [ if null operator then name else show (Label operator name) ++ inPath (reverse names)
+  | (names, inside) <- Map.toList could
+  , (operator, branches) <- Map.toList inside
+  , (name, False) <- Map.toList branches
+  , not (null operator && wasStarted name)
+  ]
  where
-  wasStarted name = Set.member name known || any ((name ++ " ") `isPrefixOf`) (Set.lookupGT name known)
+  wasStarted action = Set.member action known || any ((action ++ " ") `isPrefixOf`) (Set.lookupGT action known)

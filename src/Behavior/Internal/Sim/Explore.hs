@@ -50,15 +50,15 @@ data Trial = Trial
   , happened :: [Step]
   , traceOfRun :: [Event]
   , size :: Int
-  , actions :: [String]
-  -- ^ The scripted actions that it could start.
+  , reached :: Reached
+  -- ^ What it could start, and has.
   }
 
 -- | The runs so far: how many, their scheduling points in all, and what they have started.
 data Tally = Tally !Int !Int !Coverage
 
 counting :: Tally -> Trial -> Tally
-counting (Tally n total covered) t = Tally (n + 1) (total + size t) (withRun (traceOfRun t) (actions t) covered)
+counting (Tally n total covered) t = Tally (n + 1) (total + size t) (withRun (traceOfRun t) (reached t) covered)
 
 reported :: Bool -> Tally -> Report
 reported all' (Tally n total covered) = Report n all' total (started covered) (neverStarted covered)
@@ -226,12 +226,12 @@ tryRun o choosing property = do
           Just _ -> throwIO (ErrorCall "explore: a property simulates only once")
           Nothing -> do
             chooser' <- choosing
-            run <- simulateBy o chooser' act
+            (run, startable) <- simulateBy o chooser' act
             let deviating = case runSchedule run of
                   Preempting s -> s
                   _ -> []
             writeIORef made . Just $ \thrown' ->
-              Trial thrown' deviating (steps run) (events run) (runPoints run) (runScripted run)
+              Trial thrown' deviating (steps run) (events run) (runPoints run) startable
             case outcome run of
               BlockedOutside _ _ -> improper run
               ExternalWakeup _ -> improper run
@@ -248,4 +248,4 @@ tryRun o choosing property = do
       \it is given a function, and has to simulate with it"
     (Left e, _)
       | isCancellation e -> throwIO e
-      | otherwise -> pure (fromMaybe (\thrown' -> Trial thrown' [] [] [] 0 []) trial (Just e))
+      | otherwise -> pure (fromMaybe (\thrown' -> Trial thrown' [] [] [] 0 nothingYet) trial (Just e))

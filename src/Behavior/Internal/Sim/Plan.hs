@@ -103,7 +103,7 @@ replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 endingAt :: Plan -> Seconds -> Plan
 endingAt whole end = whole {planOptions = (planOptions whole) {endAt = end}}
 
--- | What was explored. Its text has the numbers, and the scripted actions that no schedule has started.
+-- | What was explored. Its text has the numbers, and what no schedule has started.
 --
 -- @since 0.1.0.0
 data Report = Report
@@ -118,16 +118,22 @@ data Report = Report
   -- ('Behavior.Trace.named'), scripted actions, and branches, as in @"monitor: recovery"@ or
   -- @"teleoReactive: rule 2"@. Require those without which the property shows nothing.
   , reportNeverStarted :: [String]
-  -- ^ The names of the scripted actions of mock worlds that no schedule has started.
+  -- ^ What no schedule has started, as far as it is known what could be: scripted actions of mock worlds, and
+  -- branches of reactive operators that some schedule has begun (rules, recoveries, handlers...), as in
+  -- @"monitor: recovery"@. A branch is followed by the names of the behaviours around its operator
+  -- ('Behavior.Trace.named'), as in @"teleoReactive: rule 2 (mission > way home)"@: operators of the same kind
+  -- with the same names around them count as one. (The branches of 'Behavior.Signal.switch' are not known
+  -- before; an alternative of '?' is no branch: name it, and require it in 'reportStarted'.)
   }
   deriving (Eq)
 
 instance Show Report where
   show r =
-    show (reportSchedules r) ++ " schedules of " ++ show (reportPoints r) ++ " points in all"
+    counted "schedule" (reportSchedules r) ++ " of " ++ counted "point" (reportPoints r) ++ " in all"
       ++ (if reportComplete r then "" else ", and there are more")
-      ++ (if null (reportNeverStarted r) then "" else "; none of them started " ++ neverStarted)
+      ++ (if null (reportNeverStarted r) then "" else "; never started: " ++ neverStarted)
    where
+    counted what n = show n ++ " " ++ what ++ (if n == 1 then "" else "s")
     neverStarted = intercalate ", " (map show (reportNeverStarted r))
 
 -- | A schedule under which the property does not hold.

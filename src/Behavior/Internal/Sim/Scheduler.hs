@@ -33,11 +33,13 @@ import Foreign.StablePtr (newStablePtr)
 
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.SafeText
+import Behavior.Internal.Sim.Coverage (canStart, starts)
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Trace.Place (myPlace)
 
 -- | The backend that the seam calls, for the simulation with this number.
 simulation :: Int -> Sim -> Simulator
@@ -48,6 +50,7 @@ simulation n sim =
     , spawn = \name body publish -> do
         operation sim AlwaysEnabled
         me <- readIORef (current sim)
+        reaching (starts name)
         asyncThreadId . snd <$> launch sim (taskNumber me) name body publish
     , deliver = \target e -> withTarget target $ \me there ->
         if taskNumber there == taskNumber me
@@ -66,7 +69,7 @@ simulation n sim =
     , lookAtClock = readIORef (time sim)
     , recordStart = settle sim >> recordStep sim Starts
     , recordNote = \text -> settle sim >> recordStep sim (Note text)
-    , recordScripted = \names -> modifyIORef' (scripted sim) (names ++)
+    , recordStartable = \operator branches -> reaching (canStart operator branches)
     }
  where
   -- An exception for a thread that has ended is dropped.
@@ -76,6 +79,7 @@ simulation n sim =
     operation sim AlwaysEnabled
     me <- readIORef (current sim)
     for_ found (act me)
+  reaching further = myPlace >>= \here -> modifyIORef' (reached sim) (further here)
   unlessUnwinding act = readIORef (unwinding sim) >>= \ending -> unless ending act
   -- A sender that is interrupted while it waits withdraws its exception, as in GHC's 'throwTo'.
   untilRaised there p = operation sim (Delivery there p) `onException` withdraw sim there p

@@ -24,8 +24,9 @@ import System.IO.Unsafe (unsafePerformIO)
 import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Dispatch
-import Behavior.Internal.SafeText (safeShow)
+import Behavior.Internal.SafeText (settledText)
 import Behavior.Internal.Seconds (duration)
+import Behavior.Internal.Sim.Coverage (Reached)
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
@@ -84,10 +85,10 @@ simulate = simulateWith defaultSimOptions
 simulateWith :: SimOptions -> Behavior a -> IO (Run a)
 simulateWith o act = do
   chooser' <- policy (scheduled o)
-  simulateBy o chooser' act
+  fst <$> simulateBy o chooser' act
 
--- | 'simulateWith' under the given policy.
-simulateBy :: SimOptions -> Policy -> Behavior a -> IO (Run a)
+-- | 'simulateWith' under the given policy. It also gives what the run could start, and has.
+simulateBy :: SimOptions -> Policy -> Behavior a -> IO (Run a, Reached)
 simulateBy o chooser' act = do
   nested <- simulator
   when (isJust nested) . throwIO . ErrorCall $
@@ -106,9 +107,9 @@ simulateBy o chooser' act = do
     left <- fmap taskLabel . filter (isJust . taskThread) . IntMap.elems <$> readIORef (tasks sim)
     time' <- readIORef (time sim)
     made <- reverse <$> readIORef (history sim)
-    happened <- map (runIdentity . traverseTexts (Identity . safeShow)) . reverse <$> readIORef (emitted sim)
+    happened <- map (runIdentity . traverseTexts (Identity . settledText)) . reverse <$> readIORef (emitted sim)
     count <- readIORef (counter sim)
-    actions <- readIORef (scripted sim)
+    started <- readIORef (reached sim)
     uninterruptibleMask_ (unwind sim verdict)
     end <- readIORef result
     deviating <- reverse <$> readIORef (deviations sim)
@@ -117,16 +118,17 @@ simulateBy o chooser' act = do
       Left e -> throwIO (e :: SomeException)
       Right v ->
         pure
-          Run
-            { outcome = outcomeOf v end rest
-            , finished = time'
-            , steps = made
-            , events = happened
-            , runSchedule = Preempting deviating
-            , runPoints = count
-            , leakedThreads = left
-            , runScripted = actions
-            }
+          ( Run
+              { outcome = outcomeOf v end rest
+              , finished = time'
+              , steps = made
+              , events = happened
+              , runSchedule = Preempting deviating
+              , runPoints = count
+              , leakedThreads = left
+              }
+          , started
+          )
 
 simulationNumber :: IORef Int
 simulationNumber = unsafePerformIO (newIORef 0)

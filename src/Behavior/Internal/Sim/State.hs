@@ -44,6 +44,7 @@ import Data.Void (Void)
 
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Sim.Coverage (Reached, nothingYet)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Trace.Event (Event)
@@ -84,8 +85,8 @@ data Sim = Sim
   -- ^ The steps, the latest first.
   , emitted :: !(IORef [Event])
   -- ^ The events of its trace, the latest first.
-  , scripted :: !(IORef [String])
-  -- ^ The names of the scripted actions of its mock worlds.
+  , reached :: !(IORef Reached)
+  -- ^ What its operators and mock worlds can start, and have.
   , runEnd :: !(MVar (Maybe (Outcome Void)))
   -- ^ How the run ended; 'Nothing': as the behaviour did. The task that puts it no longer has
   -- the turn.
@@ -183,7 +184,7 @@ newSim o p = do
     <*> newIORef []
     <*> newIORef []
     <*> newIORef []
-    <*> newIORef []
+    <*> newIORef nothingYet
     <*> newEmptyMVar
     <*> newIORef False
     <*> newIORef False

@@ -29,7 +29,7 @@ import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Trace.Place (inPath, placeOf)
+import Behavior.Internal.Trace.Place (Place (path), inPath, placeOf)
 
 -- | The task that runs next. 'Nothing': the run has ended here, and the driver has the turn.
 choose :: Sim -> Maybe Task -> IO (Maybe Task)
@@ -158,7 +158,7 @@ waitingTasks sim these = do
   waitingTask alive task = do
     here <- maybe (pure Nothing) placeOf (taskThread task)
     what <- reason alive task <$> readIORef (blockedAt task)
-    pure (Waiting (taskLabel task) (what ++ inPath here))
+    pure (Waiting (taskLabel task) (what ++ inPath (maybe [] path here)))
   sent target = do
     all' <- readIORef (pending target)
     pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- all', isNothing (sender p)]

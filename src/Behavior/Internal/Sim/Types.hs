@@ -98,9 +98,6 @@ data Run a = Run
   -- ^ How many scheduling points the run had.
   , leakedThreads :: [Label]
   -- ^ The threads that had not ended when the run ended.
-  , runScripted :: [String]
-  -- ^ The names of the scripted actions of the mock worlds that were used in it
-  -- ('Behavior.Sim.Mock.action').
   }
 
 -- | How a simulated run ended.

@@ -116,12 +116,11 @@ withReceiver receiver t =
 placeIn :: [Around] -> Trace -> Place
 placeIn spans t = Place {trace = t, around = spans, path = [], abandonable = []}
 
--- | The names of the spans around a place, in parentheses, for a thread's label. (Users' code computes
--- the names: they may be infinite, or throw.)
-inPath :: Maybe Place -> String
-inPath here = case path <$> here of
-  Just names@(_ : _) -> " (" ++ intercalate " > " (map (take 100 . safeShow) (reverse names)) ++ ")"
-  _ -> ""
+-- | The names of the spans around a place, the innermost first, in parentheses, for a thread's label. (Users'
+-- code computes the names: they may be infinite, or throw.)
+inPath :: [String] -> String
+inPath [] = ""
+inPath names = " (" ++ intercalate " > " (map (take 100 . safeShow) (reverse names)) ++ ")"
 
 -- | Whether there is a trace in this process. Without one this costs one read of a counter.
 isTraced :: IO Bool
