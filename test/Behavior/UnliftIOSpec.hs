@@ -8,6 +8,7 @@ import Control.Monad.IO.Class (liftIO)
 import Control.Monad.Trans.Reader (ReaderT (..), local)
 import Data.List (isInfixOf, isPrefixOf, sort, (\\))
 import Data.Map (empty)
+import System.Mem.Weak (finalize)
 import Test.Hspec hiding (parallel)
 
 import Behavior.UnliftIO
@@ -116,6 +117,8 @@ places =
   , ( "resumableFor"
     , [\act -> newTVarIO empty >>= \progress -> resumableFor progress 'k' "a" (const act) >>= atomically]
     )
+  , ("mkWeakTVar", [\act -> newTVarIO 'a' >>= (`mkWeakTVar` act) >>= liftIO . finalize])
+  , ("mkWeakTMVar", [\act -> newTMVarIO 'a' >>= (`mkWeakTMVar` act) >>= liftIO . finalize])
   , ("withTSem", [\act -> atomically (newTSem 1) >>= (`withTSem` act)])
   , ( "withInbox"
     , [ \act -> withInbox 1 (const (pure () <$ act)) (const (pure ()))

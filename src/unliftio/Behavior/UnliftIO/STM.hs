@@ -22,6 +22,8 @@ module Behavior.UnliftIO.STM
   , newBroadcastTChanIO
   , newTQueueIO
   , newTBQueueIO
+  , mkWeakTVar
+  , mkWeakTMVar
 #ifndef __HADDOCK_VERSION__
     -- Haddock would list the whole package here.
   , module Control.Concurrent.STM
@@ -40,11 +42,14 @@ import Control.Concurrent.STM hiding
   , newBroadcastTChanIO
   , newTQueueIO
   , newTBQueueIO
+  , mkWeakTVar
+  , mkWeakTMVar
   )
 import Control.Concurrent.STM.TSem
 import Control.Monad.IO.Unlift (MonadIO (..), MonadUnliftIO, withRunInIO)
 import Data.Map.Lazy (Map)
 import Numeric.Natural (Natural)
+import System.Mem.Weak (Weak)
 
 import qualified Behavior.STM as IO
 
@@ -127,3 +132,19 @@ newTQueueIO = liftIO IO.newTQueueIO
 -- @since 0.1.0.0
 newTBQueueIO :: MonadIO m => Natural -> m (TBQueue a)
 newTBQueueIO = liftIO . IO.newTBQueueIO
+
+-- | 'Control.Concurrent.STM.mkWeakTVar'.
+--
+-- > run (mkWeakTVar v a)  =  Control.Concurrent.STM.mkWeakTVar v (run a)
+--
+-- @since 0.1.0.0
+mkWeakTVar :: MonadUnliftIO m => TVar a -> m () -> m (Weak (TVar a))
+mkWeakTVar var act = withRunInIO $ \run -> IO.mkWeakTVar var (run act)
+
+-- | 'Control.Concurrent.STM.mkWeakTMVar'.
+--
+-- > run (mkWeakTMVar v a)  =  Control.Concurrent.STM.mkWeakTMVar v (run a)
+--
+-- @since 0.1.0.0
+mkWeakTMVar :: MonadUnliftIO m => TMVar a -> m () -> m (Weak (TMVar a))
+mkWeakTMVar var act = withRunInIO $ \run -> IO.mkWeakTMVar var (run act)

@@ -69,7 +69,9 @@ withTraceOptions options sinks act = withRunInIO $ \run -> IO.withTraceOptions o
 
 -- | 'Behavior.Trace.adopt'.
 --
--- > run adopt  =  (\here a -> liftIO (here (run a))) <$> Behavior.Trace.adopt
+-- > run adopt  =  (\here a -> withRunInIO (\run' -> here (run' a))) <$> Behavior.Trace.adopt
+--
+-- (The behaviour runs with the environment of the place where it runs, not of the place that is handed on.)
 --
 -- @since 0.1.0.0
 adopt :: MonadUnliftIO m => m (m a -> m a)
