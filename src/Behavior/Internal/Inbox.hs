@@ -28,7 +28,7 @@ import Data.Sequence (Seq, ViewL (..), viewl, (<|), (|>))
 import qualified Data.Sequence as Seq
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Reactive.Engine (Next (..), Reaction (..), react)
+import Behavior.Internal.Reactive.Engine (Next (..), Response (..), react)
 import Behavior.Internal.Runtime (atomically)
 import Behavior.Internal.Scope (branch, endedBy, outcome, structured)
 import Behavior.Internal.Signal.Source (Signal, named, watching)

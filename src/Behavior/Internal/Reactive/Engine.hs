@@ -7,7 +7,7 @@
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Reactive.Engine
-  ( Reaction (..)
+  ( Response (..)
   , Next (..)
   , react
   , reactToCondition
@@ -24,7 +24,7 @@ import Behavior.Internal.Trace.Event (Cause (..))
 import Behavior.Internal.Trace.Observer
 
 -- | What an operator does for a value of the signal.
-data Reaction a
+data Response a
   = -- | Run this branch (with its name) until it ends or the value changes.
     Run String (Behavior a)
   | -- | Run this branch to its end, without watching the signal.
@@ -35,7 +35,7 @@ data Reaction a
     Conclude (Maybe Cause) (IO a)
 
 -- | The name of the branch that it starts.
-branchOf :: Reaction a -> Maybe String
+branchOf :: Response a -> Maybe String
 branchOf = \case
   Run name _ -> Just name
   RunToEnd name _ -> Just name
@@ -48,32 +48,32 @@ data Next a = BeginAgain | EndWith a
 data Engine k a = Engine
   { scope :: Scope
   , source :: Source k
-  , reaction :: k -> Reaction a
+  , response :: k -> Response a
   , observer :: Observer
   }
 
 -- | What wakes the operator, if it is not the end of its branch.
 data Wakeup k a
-  = Changed k Values !(Reaction a)
+  = Changed k Values !(Response a)
   | SensorDied SomeException
 
--- | Runs the reaction to the signal's value, and changes to another reaction when the value
+-- | Gives the response to the signal's value, and changes to another when the value
 -- changes. The list has the values whose branches a simulation is to expect.
-react :: Eq k => String -> [k] -> Signal k -> (k -> Reaction a) -> Behavior a
+react :: Eq k => String -> [k] -> Signal k -> (k -> Response a) -> Behavior a
 react = reactNaming id
 
 -- | The same for a condition, which a trace shows under the name \"condition\" if it has none.
-reactToCondition :: String -> Signal Bool -> (Bool -> Reaction a) -> Behavior a
+reactToCondition :: String -> Signal Bool -> (Bool -> Response a) -> Behavior a
 reactToCondition name = reactNaming (orNamed "condition") name [False, True]
 
-reactNaming :: Eq k => (Source k -> Source k) -> String -> [k] -> Signal k -> (k -> Reaction a) -> Behavior a
-reactNaming naming name expected signal toReaction = do
-  announce name [next | k <- expected, Just next <- [branchOf (toReaction k)]]
+reactNaming :: Eq k => (Source k -> Source k) -> String -> [k] -> Signal k -> (k -> Response a) -> Behavior a
+reactNaming naming name expected signal toResponse = do
+  announce name [next | k <- expected, Just next <- [branchOf (toResponse k)]]
   -- (No branch has been started yet: what 'open' throws is simply thrown.)
   opened <- openInTrace naming (suppressEqual signal) everyValue
   structured name $ \within -> do
     seen <- newObserver name
-    ending seen (startOver Engine {scope = within, source = opened, reaction = toReaction, observer = seen} FirstRead)
+    ending seen (startOver Engine {scope = within, source = opened, response = toResponse, observer = seen} FirstRead)
 
 -- | Starts the sensors, reads the signal, and does what its value requires.
 startOver :: Eq k => Engine k a -> ReadMode -> IO (Verdict a)
@@ -81,7 +81,7 @@ startOver engine how = do
   (seen, sensors) <- startSensors (scope engine) (source engine)
   wakeup <- atomically (readWakeup engine sensors seen (readView how seen))
   cause <- decidesOn engine wakeup
-  applyReaction engine sensors seen cause wakeup
+  applyResponse engine sensors seen cause wakeup
 
 -- | Reads the signal. That runs users' code (views, functions, equality): what that code throws
 -- is caught here, so that any other exception in the operator's thread came from outside.
@@ -94,7 +94,7 @@ readWakeup engine sensors seen value =
   changed = do
     k <- value
     values <- observed (observer engine) (readings seen)
-    pure $! Changed k values (reaction engine k)
+    pure $! Changed k values (response engine k)
 
 -- | Why the operator stops what it stops now.
 decidesOn :: Engine k a -> Wakeup k a -> IO Cause
@@ -110,8 +110,8 @@ decidesOn engine = \case
     _ -> False
 
 -- | Does what the wakeup requires. No branch runs.
-applyReaction :: Eq k => Engine k a -> Sensors -> View k -> Cause -> Wakeup k a -> IO (Verdict a)
-applyReaction engine sensors seen cause = \case
+applyResponse :: Eq k => Engine k a -> Sensors -> View k -> Cause -> Wakeup k a -> IO (Verdict a)
+applyResponse engine sensors seen cause = \case
   SensorDied e -> pure (Verdict cause (throwIO e))
   Changed _ _ (Conclude _ verdict) -> pure (Verdict cause verdict)
   Changed _ _ (RunToEnd name recovery) -> do
@@ -121,7 +121,7 @@ applyReaction engine sensors seen cause = \case
     waits (observer engine)
     change <- atomically (awaitChange old)
     why <- decidesOn engine change
-    applyReaction engine sensors seen why change
+    applyResponse engine sensors seen why change
   Changed old _ (Run name act) -> do
     running <- starts (observer engine) name (branch (scope engine) name act)
     -- The branch is read first: one that has ended by itself is not interrupted, whatever
@@ -155,7 +155,7 @@ interrupt engine sensors cause name running = \case
       Stopped _ -> do
         forget (scope engine) running
         (seen, wakeup) <- readAgain
-        applyReaction engine sensors seen cause wakeup
+        applyResponse engine sensors seen cause wakeup
       _ -> pure (endedBy name end)
  where
   sensors' = map SomeBranch sensors

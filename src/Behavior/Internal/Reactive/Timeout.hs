@@ -20,7 +20,7 @@ import Behavior.Internal.Failure
   , behaviorFailedFromException
   , behaviorFailedToException
   )
-import Behavior.Internal.Reactive.Engine (Reaction (..), react)
+import Behavior.Internal.Reactive.Engine (Response (..), react)
 import Behavior.Internal.Runtime (atomically, now, sleepUntil)
 import Behavior.Internal.Seconds (Seconds, duration, moment)
 import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), constantView, fromView)

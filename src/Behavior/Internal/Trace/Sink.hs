@@ -70,7 +70,7 @@ data Running = Running
 
 -- | The events that the sink's thread has not taken yet.
 data Queue = Queue
-  { stage :: !Stage
+  { phase :: !Phase
   , size :: !Int
   , newestFirst :: [Event]
   , dropped :: !Int
@@ -84,7 +84,8 @@ data Queue = Queue
 produced :: Queue -> Int
 produced q = size q + dropped q
 
-data Stage
+-- | What a sink's thread does.
+data Phase
   = -- | The thread waits to be woken.
     Idle
   | Busy
@@ -126,22 +127,22 @@ emit limit running event = do
   when mustWake (void (tryPutMVar (wake running) ()))
  where
   put q
-    | stage q >= Closed = (q, False)
+    | phase q >= Closed = (q, False)
     | size q >= limit = (q {dropped = dropped q + 1}, False)
-    | otherwise = (q {stage = Busy, size = size q + 1, newestFirst = event : newestFirst q}, stage q == Idle)
+    | otherwise = (q {phase = Busy, size = size q + 1, newestFirst = event : newestFirst q}, phase q == Idle)
 
 -- | Passes what is in the queue to the sink, until the trace has ended and the queue is empty. After
 -- each batch it waits for ten milliseconds, so that it is seldom woken.
 drain :: Running -> Sink -> IO ()
 drain running destination = do
   q <- change $ \q ->
-    let next = if isEmpty q && stage q == Busy then Idle else stage q
-     in (Queue {stage = next, size = 0, newestFirst = [], dropped = 0, taken = produced q}, q)
+    let next = if isEmpty q && phase q == Busy then Idle else phase q
+     in (Queue {phase = next, size = 0, newestFirst = [], dropped = 0, taken = produced q}, q)
   if isEmpty q
-    then unless (stage q >= Closed) (awaitWake >> drain running destination)
+    then unless (phase q >= Closed) (awaitWake >> drain running destination)
     else do
       writeIORef (inFlight running) (produced q)
-      now' <- change (\after -> (after {taken = 0}, stage after))
+      now' <- change (\after -> (after {taken = 0}, phase after))
       unless (now' == LeftBehind) $ do
         pass (size q) (reverse (newestFirst q)) (dropped q)
         _ <- timeout 10000 (readMVar (closing running))
@@ -168,7 +169,7 @@ settled = traverseTexts (evaluate . settledText)
 -- | Accepts no more events.
 close :: Running -> IO ()
 close running = do
-  atomicModifyIORef' (queue running) (\q -> (q {stage = max Closed (stage q)}, ()))
+  atomicModifyIORef' (queue running) (\q -> (q {phase = max Closed (phase q)}, ()))
   void (tryPutMVar (closing running) ())
   void (tryPutMVar (wake running) ())
 
@@ -181,7 +182,7 @@ end (Seconds limit) running = do
   for_ running $ \r -> awaitUntil deadline (done r) >>= \isDone -> unless isDone (leave r)
  where
   leave r = do
-    q <- atomicModifyIORef' (queue r) (\q -> (q {stage = LeftBehind, size = 0, newestFirst = [], dropped = 0}, q))
+    q <- atomicModifyIORef' (queue r) (\q -> (q {phase = LeftBehind, size = 0, newestFirst = [], dropped = 0}, q))
     passing <- atomicModifyIORef' (inFlight r) ((,) 0)
     notifySoon (SinkLeft (Seconds limit) (produced q + (if taken q > 0 then taken q else passing)))
 
