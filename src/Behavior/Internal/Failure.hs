@@ -37,7 +37,6 @@ module Behavior.Internal.Failure
   , isFailure
   , isCancellation
   , trySynchronous
-  , catchSynchronous
 
     -- * What to do when something fails
   , fallback

@@ -8,7 +8,6 @@
 module Behavior.Internal.Reactive.Polled
   ( rSelect
   , monitor
-  , defaultPeriod
   ) where
 
 import Behavior.Internal.Failure (Behavior)
