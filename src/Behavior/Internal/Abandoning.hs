@@ -53,9 +53,9 @@ import Behavior.Internal.Trace.Span (abandonableIn)
 -- An 'Abandoned' reports when a behaviour is abandoned, and when it ends at last, with what. It is
 -- passed to GHC's handler for uncaught exceptions, which prints it to @stderr@ unless
 -- 'GHC.Conc.setUncaughtExceptionHandler' has set another. (In a simulation it is in the record of the run.)
--- Until then the behaviour is counted ('abandonedCount'), and its thread remains, with two that wait for it.
--- The end of the program ends it, without a report. With zero seconds also a behaviour is abandoned
--- that would have stopped at once.
+-- Until it ends, an abandoned behaviour is counted ('abandonedCount'), and keeps its thread and two that wait for
+-- it. The end of the program ends it, without a report. With zero seconds, even a behaviour that would have
+-- stopped at once is abandoned.
 --
 -- A negative number or NaN is refused with an 'Control.Exception.ErrorCall' (a fault).
 --

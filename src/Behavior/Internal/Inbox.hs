@@ -212,8 +212,8 @@ messageRule inbox handle = do
 -- [Cancellation] Passes through; the message waits again. The handler runs in the caller's thread
 --   and masking state; the transaction is committed masked, and can be interrupted while it retries.
 --
--- An effect outside of variables which must not be repeated, is the last step, does not block after its
--- effect, and is masked, so that nothing comes between it and the commit:
+-- If an effect outside of variables must not be repeated, make it the last step of the handler, and mask it;
+-- it must not block once it has happened. Then nothing comes between it and the commit:
 --
 -- > mask $ \restore -> handleNext inbox (\order -> restore (carry order) >> handOver order >> pure (pure ()))
 --

@@ -44,8 +44,8 @@ import Behavior.Internal.Runtime (atomically)
 -- [Cancellation] Passes through; the element stays in the list. The behaviour runs in the caller's
 --   thread and masking state.
 --
--- An effect outside of variables (a report that is sent) which must not be repeated, is the last step,
--- does not block after its effect, and is masked, so that nothing comes between it and the commit:
+-- If an effect outside of variables (a report that is sent) must not be repeated, make it the last step, and
+-- mask it; it must not block once it has happened. Then nothing comes between it and the commit:
 --
 -- > mask $ \restore -> resumable left (\x -> restore (driveTo x) >> report x)
 --

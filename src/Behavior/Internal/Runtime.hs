@@ -231,7 +231,7 @@ throwToAll what targets =
       ([], _) -> pure ()
       (thread : _, _) -> throwTo thread (what thread) >> drain left
 
--- | How many threads started by 'start' have not ended.
+-- | How many threads that were started by 'start', or for a sink of a trace, have not ended.
 liveThreadCount :: IO Int
 liveThreadCount = total threads
 

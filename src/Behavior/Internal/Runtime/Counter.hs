@@ -28,7 +28,7 @@ foreign import ccall unsafe "behavior_lang_add" add :: Counter -> Int -> IO ()
 total :: Counter -> IO Int
 total (Counter pointer) = peek pointer
 
--- | The threads started by this library that have not ended.
+-- | The threads started by this library, for branches or for the sinks of traces, that have not ended.
 foreign import ccall "&behavior_lang_threads" threads :: Counter
 
 -- | The simulations that run.

@@ -51,8 +51,7 @@ data Span = Span
   , spanName :: String
   , spanBegan :: !Seconds
   , spanReaction :: !(Maybe Int)
-  -- ^ The number of the reaction that started it: of the innermost branch that it runs in, if it
-  -- is the outermost span there.
+  -- ^ The number of the reaction that started the innermost branch around it, unless another span is in between.
   }
   deriving (Eq, Ord, Show, Read)
 

@@ -64,7 +64,7 @@ data Running = Running
   , closing :: !(MVar ())
   -- ^ Filled when the trace ends.
   , inFlight :: !(IORef Int)
-  -- ^ Of how many events that left the queue the sink knows nothing yet.
+  -- ^ How many events have left the queue, but have not been passed to the sink yet.
   , done :: !(IORef Bool)
   }
 
