@@ -11,7 +11,7 @@ module Behavior.Internal.Reactive.Pausing
   ) where
 
 import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
-import Control.Exception (mask_, throwIO, try, uninterruptibleMask_)
+import Control.Exception (mask_, throwIO, try)
 import Control.Monad (unless)
 
 import Behavior.Internal.Failure (Behavior)
@@ -104,16 +104,15 @@ pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
         Completed () -> sleepForever
         _ -> pure ()
   let cause = either causeOf (\() -> SiblingFailed "pause") stopped
-  uninterruptibleMask_ $ do
-    requestStop cause [SomeBranch pausing]
-    paused <- awaitUninterruptibly (awaitOutcome pausing)
-    resumed <- branch scope "resume" resume >>= awaitUninterruptibly . awaitOutcome
-    pure . Verdict cause $ do
-      case paused of
-        Failing e -> throwIO e
-        _ -> pure ()
-      outcomeToIO resumed
-      either throwIO pure stopped
+  requestStopAsync cause [SomeBranch pausing]
+  paused <- awaitUninterruptibly (awaitOutcome pausing)
+  resumed <- branch scope "resume" resume >>= awaitUninterruptibly . awaitOutcome
+  pure . Verdict cause $ do
+    case paused of
+      Failing e -> throwIO e
+      _ -> pure ()
+    outcomeToIO resumed
+    either throwIO pure stopped
 
 -- | Runs a behaviour only while a condition does not hold: when it becomes true, the behaviour is
 -- stopped; when it is false again, the behaviour begins again, from its beginning.
