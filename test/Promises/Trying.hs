@@ -50,7 +50,7 @@ underRandom from n (Promise text gen keeping) =
  where
   one i =
     let program = programFrom (gen Full) (seedOf text i)
-     in tried (show program) (Random perProgram (seedOf text i)) (\stage -> keeping stage program)
+     in tried (show program) (Random perProgram (seedOf text i)) (`keeping` program)
 
 -- | The seed of the i-th program for the promise with this text: each promise is tried with other programs.
 seedOf :: String -> Int -> Int
@@ -69,7 +69,7 @@ underAll from preemptions limit n (Promise text gen keeping) =
  where
   one i =
     let program = programFrom (gen Tiny) (seedOf text i)
-     in tried (show program) (Exhaustive preemptions limit) (\stage -> keeping stage program)
+     in tried (show program) (Exhaustive preemptions limit) (`keeping` program)
 
 tried :: String -> Search -> (Stage -> IO ()) -> IO Tried
 tried program how keeping =

@@ -111,7 +111,8 @@ decides (Observer here operator cell) always after = do
               , reactionStopped = Nothing
               , reactionStarts = Nothing
               }
-      SignalChanged n changes <$ writeIORef cell seen {lastValues = Just after, reaction = Just reacted, isReported = False}
+      writeIORef cell seen {lastValues = Just after, reaction = Just reacted, isReported = False}
+      pure (SignalChanged n changes)
 
 -- | What the values were before, and are now. (Several signals may have the same name: then the first
 -- belongs to the first, and so on.) Of ordered rules, those whose conditions have changed, up to the first rule

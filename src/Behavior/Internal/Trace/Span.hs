@@ -79,7 +79,7 @@ actionSpan name act = isTraced >>= \traced -> if traced then spanned (\_ -> pure
 spanned :: (String -> IO ()) -> (Place -> SomeException -> SomeException) -> String -> Behavior a -> Behavior a
 spanned noting change name act =
   myPlace >>= \case
-    Nothing -> newestTrace >>= maybe act (\t -> inside (placeIn [InUnknown] t))
+    Nothing -> newestTrace >>= maybe act (inside . placeIn [InUnknown])
     Just place -> inside place
  where
   inside place = mask $ \restore -> do
