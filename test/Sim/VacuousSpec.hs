@@ -148,7 +148,7 @@ coverage = do
           rules = Signal.teleoReactive [(isFirst, sleep 1), (not <$> isFirst, pure ())]
       both (atomically (writeTVar first False)) (both rules (Signal.monitor isFirst (sleep 1) (pure ())))
     reportNeverStarted report `shouldBe` []
-  it "tells operators apart by the names of the behaviours around them" $ do
+  it "distinguishes operators by the names of the behaviours around them" $ do
     let charging = Signal.monitor (pure False) (pure ()) (pure ())
         stopping low = Signal.insteadWhen (pure low) (pure ()) (pure ())
     report <- explore (randomly 3) $ \simulated ->

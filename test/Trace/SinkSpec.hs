@@ -68,7 +68,8 @@ receiving = do
     let slow = unsafePerformIO (putMVar entered () >> readMVar mayGo)
     seen <- newIORef []
     reporting $ \reports -> do
-      withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :) >> void (myThreadId >>= tryPutMVar thread))] $ do
+      let receive e = modifyIORef' seen (e :) >> void (myThreadId >>= tryPutMVar thread)
+      withTraceOptions patient [EachEvent receive] $ do
         named "first" (pure ())
         sink <- readMVar thread
         named slow (takeMVar entered >> throwing sink (Cancel "the sink"))

@@ -77,7 +77,7 @@ resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
 -- where it was, whichever robot works on it now, and whatever came in between: an interruption, a failure
 -- and a retry. A key stays in the map, also when nothing is left for it, until the transaction that is
 -- returned has removed it. Commit that together with what says that the whole is done: then neither is
--- repeated, whatever interrupts it in between. Of an order that is given up, nobody else removes the key (of
+-- repeated, whatever interrupts it in between. Of an order that is given up, nothing else removes the key (of
 -- a message that was begun, and then dropped by a full inbox): do it with @modifyTVar progress (Map.delete key)@.
 --
 -- > handleNext orders (\order -> resumableFor progress (number order) (steps order) carryOut)
