@@ -155,8 +155,20 @@ spec = guarded . describe "runBehavior" $ do
           `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
         takeMVar received
 
+    it ("returns only after a " ++ name ++ " at the very end of the behaviour has had its effect") $ do
+      replicateM_ 20 $
+        inChild (byDefault signal >> runBehavior (raiseSignal signal))
+          >>= (`shouldSatisfy` (`elem` [Terminated signal False, Exited (ExitFailure code)]))
+      withHandler signal $ \received ->
+        replicateM_ 20 $
+          try (runBehavior (raiseSignal signal)) >>= \case
+            Left end -> end `shouldBe` ExitFailure code
+            Right () -> tryTakeMVar received `shouldReturn` Just ()
+
     it ("ends the process by a " ++ name ++ " after the end, where that is the default") $ do
       inChild (byDefault signal >> runBehavior (pure ()) >> raiseSignal signal >> hang)
+        >>= (`shouldBe` Terminated signal False)
+      inChild (byDefault signal >> runBehavior (pure ()) >> raiseSignal signal)
         >>= (`shouldBe` Terminated signal False)
       inChild (byDefault signal >> replicateM_ 100 (runBehavior (pure ())) >> raiseSignal signal >> hang)
         >>= (`shouldBe` Terminated signal False)

@@ -11,8 +11,8 @@
 --
 -- (A) While there are runs, all of them receive the signal.
 --
--- (B) When there is no run any more, the signal is raised again for the handler that was
---     installed before the first run.
+-- (B) When there is no run any more, the handler that was installed before the first run is called, or the
+--     signal raised again for it.
 --
 -- (C) A signal whose handler GHC has not yet called is dropped if that handler is replaced by
 --     the default. So where the default was installed before, this handler stays installed,
@@ -20,6 +20,10 @@
 --
 -- (D) GHC calls no handler while a loop that never allocates keeps it from running other threads.
 --     Then the second signal ends the process (in @signals.c@).
+--
+-- (E) The program may end before GHC has called a handler. So a run that ends waits until those of
+--     the signals before have been called (at most a second), and when there is no run any more, the
+--     default is done by @signals.c@, at once.
 --
 -- Two things are special about SIGHUP. Where it is ignored when the first run begins (by nohup),
 -- it stays ignored. And when a terminal is closed, the shell and the kernel send one each: at the
@@ -39,14 +43,24 @@ import Control.Concurrent.STM (STM, retry)
 withSignals :: (STM (String, Int) -> IO a) -> IO a
 withSignals act = act retry
 #else
-import Control.Concurrent.MVar (MVar, modifyMVar, modifyMVar_, newMVar)
+import Control.Concurrent (forkIOWithUnmask, threadDelay)
+import Control.Concurrent.MVar
+  ( MVar
+  , modifyMVar
+  , modifyMVar_
+  , newEmptyMVar
+  , newMVar
+  , putMVar
+  , readMVar
+  , withMVar
+  )
 import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Concurrent.STM.TVar (mkWeakTVar)
-import Control.Exception (bracket, uninterruptibleMask_)
-import Control.Monad (filterM, unless, void)
+import Control.Exception (bracket, finally, uninterruptibleMask_)
+import Control.Monad (filterM, unless, void, when)
 import Data.Foldable (for_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef)
-import Data.Maybe (catMaybes)
+import Data.Maybe (catMaybes, fromMaybe)
 import Data.Traversable (for)
 import Foreign.C (CInt (..))
 import GHC.Clock (getMonotonicTime)
@@ -56,6 +70,7 @@ import System.Mem.Weak (Weak, deRefWeak)
 import System.Posix.Process (getProcessID)
 import System.Posix.Signals (Handler (..), Signal, installHandler, raiseSignal, sigHUP, sigINT, sigTERM)
 import System.Posix.Types (ProcessID)
+import System.Timeout (timeout)
 
 import Behavior.Internal.Runtime (atomically)
 
@@ -129,30 +144,56 @@ enter = do
       pure (signal, if stayed then Default else handlerBefore)
     pure known {before = old}
 
--- | Ends a run.
+-- | Ends a run. (The wait after it can be interrupted: a handler may throw to this thread.)
 leave :: (Int, TVar State) -> IO ()
-leave (n, state) = uninterruptibleMask_ $ do
+leave (n, state) = do
   current <- process
-  modifyMVar_ current $ \known -> do
-    end <- readTVarIO state
-    let others = filter ((/= n) . fst) (runs known)
-        left = known {runs = others, pending = if end == Taken then Nothing else pending known}
-    if null (runs left) then restore left else pure left
+  handled <- uninterruptibleMask_ $ do
+    -- (E)
+    allAnswered
+    modifyMVar current $ \known -> do
+      end <- readTVarIO state
+      let others = filter ((/= n) . fst) (runs known)
+          left = known {runs = others, pending = if end == Taken then Nothing else pending known}
+      if null (runs left) then restore left else pure (left, pure ())
+  handled
+  allAnswered
+  withMVar current (const (pure ()))
  where
   restore left = do
+    let noHangup = maybe (noHangupUntil left) (const 0) (pending left)
+    answer
     for_ (before left) $ \case
-      (_, Default) -> pure ()
+      (signal, Default) -> unless (signal == sigHUP && noHangup > 0) (rest signal)
       (signal, handler) -> void (installHandler signal handler Nothing)
-    for_ (pending left) raiseSignal
-    pure nothingRuns {noHangupUntil = maybe (noHangupUntil left) (const 0) (pending left)}
+    handled <- for (pending left) $ \signal -> raiseFor (lookup signal (before left)) signal
+    pure (nothingRuns {noHangupUntil = noHangup}, fromMaybe (pure ()) handled)
+
+-- | Raises the signal for the handler, and gives the action that waits, at most a second, until the
+-- handler has ended. (GHC would call it some time later, when the program may have ended.)
+raiseFor :: Maybe Handler -> Signal -> IO (IO ())
+raiseFor (Just (Catch act)) _ = do
+  done <- newEmptyMVar
+  _ <- forkIOWithUnmask $ \unmask -> unmask act `finally` putMVar done ()
+  pure (void (timeout 1000000 (readMVar done)))
+raiseFor _ signal = pure () <$ raiseSignal signal
+
+-- | Waits, at most a second, until the handler has been called for each signal that has come.
+allAnswered :: IO ()
+allAnswered = wait (1000 :: Int)
+ where
+  wait left = do
+    open <- unanswered
+    when (open /= 0 && left > 0) $ threadDelay 1000 >> wait (left - 1)
 
 -- | The handler of a signal.
 received :: Signal -> IO ()
 received signal = uninterruptibleMask_ $ do
-  answer
   current <- process
   t <- getMonotonicTime
   modifyMVar_ current $ \known -> do
+    -- (Whoever has seen the answer, and locks the state then, comes after this handler.)
+    answer
     there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
     case there of
       -- (B)
@@ -211,6 +252,12 @@ foreign import ccall unsafe "behavior_lang_ignores" ignores :: CInt -> IO CInt
 -- | Lets the second of two signals, if no Haskell thread has answered the first for two seconds,
 -- print why and end the process. To be called when the handler has been installed.
 foreign import ccall unsafe "behavior_lang_watch" watch :: CInt -> IO ()
+
+-- | From now on the signal has its default effect at once, until 'watch' is called.
+foreign import ccall unsafe "behavior_lang_rest" rest :: CInt -> IO ()
+
+-- | Whether a signal has not been answered: 1 or 0.
+foreign import ccall unsafe "behavior_lang_unanswered" unanswered :: IO CInt
 
 -- | The answer to a signal.
 foreign import ccall unsafe "behavior_lang_answer" answer :: IO ()

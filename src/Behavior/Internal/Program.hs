@@ -33,11 +33,12 @@ import Behavior.Internal.Trace.Event (Cause (..))
 --   second SIGINT or SIGTERM, two seconds later, ends the process, and prints what the cause may be.
 --
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
--- instead of the exit. A signal that comes too late to cancel the behaviour is raised
--- again, for the handler that was installed before: no first signal is without effect. (After the
+-- instead of the exit. A signal that comes too late to cancel the behaviour has the effect that it
+-- had before: the handler that was installed then is called, and awaited for at most a second, before
+-- this returns. So no first signal that comes while this runs is without effect. (After the
 -- behaviour, these signals have the effect that they had before it. If that was the
 -- default, a handler of this library does it, so 'System.Posix.Signals.installHandler'
--- returns that handler.)
+-- returns that handler. GHC's own handler of SIGINT may be called too late, when the program is ending.)
 --
 -- Call it in the thread of @main@. In a thread of 'Control.Concurrent.forkIO' the exit code
 -- is thrown in that thread: the behaviour is cancelled, and the process goes on. When
