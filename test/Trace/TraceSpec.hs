@@ -5,6 +5,7 @@
 module Trace.TraceSpec (spec) where
 
 import Control.Concurrent (forkIO, myThreadId, yield)
+import Control.Concurrent.Async (wait, withAsync)
 import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception
 import Control.Monad (void)
@@ -20,6 +21,7 @@ import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Internal.Trace.Place (Place (trace), Receiver (..), Trace (traceClock), inPlace, myPlace, withReceiver)
 import Behavior.Internal.Trace.Span (abandonableIn)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
+import Behavior.STM (resumable)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (SimOptions (scheduled), Run (events), Schedule (..), defaultSimOptions, simulateWith)
 import Behavior.Time (abandoning, atomically, cleanupWithin, timeout)
@@ -343,15 +345,32 @@ reactions = do
     (_, seen) <- traceOf (Signal.insteadWhen (Signal.watching (readTVar level)) (pure ()) changing)
     [reactionChanges r | Reacted r <- seen] `shouldBe` [[Change "condition" (Just "False") "True"]]
 
+  it "shows names and values wherever the trace begins" $ do
+    let begun = summary . snd <$> tracedWith defaultTraceOptions {withOperators = True} reacting
+        summary seen = ([reactionChanges r | Reacted r <- seen], parentsOf seen)
+        inPlaceOf around' = do
+          seen <- newTVarIO ([], [])
+          () <- around' (begun >>= atomically . writeTVar seen)
+          readTVarIO seen
+    expected <- begun
+    fst expected
+      `shouldBe` [ [Change "battery" (Just "100") "5", Change "low" (Just "False") "True"]
+                 , [Change "condition" (Just "False") "True"]
+                 , [Change "battery" (Just "1") "0"]
+                 ]
+    for_ places $ \place -> (,) (placeName place) <$> inPlaceOf (placed place) `shouldReturn` (placeName place, expected)
+    inPlaceOf (\act -> newTVarIO [()] >>= (`resumable` const act)) `shouldReturn` expected
+    inPlaceOf (\act -> withTrace [] (named "outer" (adopt >>= \here -> withAsync (here act) wait))) `shouldReturn` expected
+
   it "shows names and values also of signals that were shared before the trace began" $
     for_
       [ ("a signal", id)
       , ("a filter", Signal.debounce 0)
       , ("a filter that remembers", fmap (> 0) . Signal.changes)
       ]
-      $ \(_ :: String, filtered) -> do
+      $ \(_ :: String, filtered) -> for_ [Signal.watching . readTVar, Signal.polling 0.001 . readTVarIO] $ \source -> do
         let watched level =
-              Signal.named "low" (filtered ((< 10) <$> Signal.named "battery" (Signal.watching (readTVar level))))
+              Signal.named "low" (filtered ((< 10) <$> Signal.named "battery" (source level)))
             drive level low = Signal.insteadWhen low (pure ()) (atomically (writeTVar level 5) >> hang)
             changed (_, seen) = [reactionChanges r | Reacted r <- seen]
         level <- newTVarIO (100 :: Int)
@@ -397,6 +416,17 @@ reactions = do
                  , (changedTo "order" 2 0, Just "rule 3")
                  , ([Change "condition 3" (Just "True") "False"], Just "rule 4")
                  ]
+
+-- | Three operators, each of which reacts to one change.
+reacting :: Behavior ()
+reacting = do
+  level <- newTVarIO (100 :: Int)
+  let watched = Signal.watching (readTVar level)
+      battery = Signal.named "battery" watched
+      falling n = atomically (writeTVar level n) >> hang
+  Signal.insteadWhen (Signal.named "low" ((< 10) <$> battery)) (pure ()) (falling 5)
+  Signal.insteadWhen ((< 3) <$> watched) (pure ()) (falling 1)
+  Signal.teleoReactive [((< 1) <$> battery, pure ()), (pure True, falling 0)]
 
 tracing :: Spec
 tracing = do
