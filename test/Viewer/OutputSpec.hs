@@ -12,6 +12,7 @@ import qualified Data.ByteString as Bytes
 import qualified Data.ByteString.Char8 as Char8
 import Data.List (isPrefixOf)
 import System.Environment (lookupEnv, setEnv, unsetEnv)
+import System.Exit (ExitCode (..))
 import System.IO
 import System.Posix.IO
 import System.Posix.Terminal (openPseudoTerminal, queryTerminal)
@@ -96,6 +97,16 @@ spec = before_ pseudoTerminals $ do
         void (dupTo file stdOutput)
       putStrLn "to the file" >> hFlush stdout
     screen output `shouldSatisfy` notElem "to the file"
+
+  it "does not change how the action ends, if the terminal is closed meanwhile" $ do
+    (master, slave) <- openPseudoTerminal
+    h <- fdToHandle slave
+    ended <- withTerm . try . withTerminal h $ \sink -> do
+      sink (take 3 mission)
+      closeFd master
+      throwIO (ExitFailure 129)
+    _ <- try (hClose h) :: IO (Either IOException ())
+    ended `shouldBe` (Left (ExitFailure 129) :: Either ExitCode ())
  where
   withFd = bracket (openFile "/dev/null" WriteMode >>= handleToFd) closeFd
 
@@ -130,8 +141,11 @@ inTerminal act = within' $ do
     case piece of
       Right bytes | not (Bytes.null bytes) -> atomically (modifyTVar' written (bytes :)) >> collect reader written
       other -> either (\e -> let _ = e :: IOException in pure ()) (const (pure ())) other
-  withTerm = bracket (lookupEnv "TERM" <* setEnv "TERM" "xterm") (maybe (unsetEnv "TERM") (setEnv "TERM")) . const
   redirected slave run =
     bracket (flushed >> mapM dup [stdOutput, stdError]) back $ \_ -> mapM_ (dupTo slave) [stdOutput, stdError] >> run
   back saved = flushed >> forM_ (zip saved [stdOutput, stdError]) (\(s, fd) -> dupTo s fd >> closeFd s)
   flushed = hFlush stdout >> hFlush stderr
+
+-- Runs the action with terminals of a known kind.
+withTerm :: IO a -> IO a
+withTerm = bracket (lookupEnv "TERM" <* setEnv "TERM" "xterm") (maybe (unsetEnv "TERM") (setEnv "TERM")) . const

@@ -63,11 +63,15 @@ withTerminal h use = do
   let safe = if maybe False (("UTF" `isPrefixOf`) . show) encoding then id else inAscii
   live <- hSupportsANSI h
   if live
-    then bracket (hDuplicate h) hClose $ \terminal -> do
+    then bracket (hDuplicate h) (\terminal -> hClose terminal `catch` noTerminal) $ \terminal -> do
       mapM_ (hSetEncoding terminal) encoding
       hSetBuffering terminal (BlockBuffering Nothing)
       redrawn terminal safe use
     else use (\events -> mapM_ (hPutStrLn h . safe . plainLine) events *> hFlush h)
+
+-- (It may be gone.)
+noTerminal :: IOException -> IO ()
+noTerminal _ = pure ()
 
 -- What is on the screen below the lines that were printed: the tree, and above it the line that is not complete. If
 -- that is too long, it has been printed as far as it is known, and there is no tree until it ends.
@@ -135,9 +139,6 @@ redrawn h safe use = do
   showing loop stop stopped act = mask $ \restore -> do
     _ <- forkIOWithUnmask $ \unmask -> (unmask loop `catch` anything) `finally` putMVar stopped ()
     restore act `finally` (putMVar stop () *> takeMVar stopped)
-  -- (It may be gone.)
-  noTerminal :: IOException -> IO ()
-  noTerminal _ = pure ()
   anything :: SomeException -> IO ()
   anything _ = pure ()
 
