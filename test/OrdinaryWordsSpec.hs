@@ -32,6 +32,18 @@ import Behavior.Sim
 import Behavior.Sim.Mock
 import Behavior.Time
 import Behavior.Trace
+import Behavior.Trace.Describe
+import Behavior.Trace.Diff
+import Behavior.Trace.File
+import Behavior.Trace.Format
+import Behavior.Trace.Path
+import Behavior.Trace.Recording
+import Behavior.Trace.Summary
+import Behavior.Trace.Svg
+import Behavior.Trace.Terminal
+import Behavior.Trace.TraceEvents
+import Behavior.Trace.Tree
+import Behavior.Trace.Viewing
 
 spec :: Hspec.Spec
 spec = Hspec.it "leaves a hundred ordinary words to the programs that import its modules" $
@@ -39,52 +51,58 @@ spec = Hspec.it "leaves a hundred ordinary words to the programs that import its
 
 ordinaryWords :: [String]
 ordinaryWords =
-  [ angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, box, brake, call, camera, cancel,
-    capacity, cargo, charge, close, color, command, complete, config, contents, count, current, defaults, depth,
-    describe, detailed, did, direction, distance, dock, door, drive, duration, end, entries, failing, field, find,
-    forward, frame, front, full, goal, grasp, gripper, group, handle, heading, height, home, index, input, item, job,
-    joint, key, kind, label, left, level, lift, light, limit, line, load, location, lock, look, low, mass, measure,
-    message, mission, mode, model, motor, move, name, next, node, number, obstacle, offset, open, order, origin,
-    parent, part, path, pause, place, point, points, position, power, priority, progress, queue, radius, range, rate,
-    ready, reason, reset, result, right, robot, room, route, run, safe, scan, schedule, schedules, score, search,
-    seconds, send, size, slip, speed, start, state, status, step, stop, subject, subjects, table, target, task,
-    temperature, text, thread, tick, time, tool, total, turn, unit, update, value, velocity, wait, wall, weight, what,
-    wheel, who, width, world, zone
+  [ angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begins, box, brake, call, camera,
+    cancel, capacity, cargo, charge, close, color, command, complete, config, contents, count, current, defaults,
+    depth, describe, detailed, did, direction, distance, dock, door, drive, duration, end, ends, entries, failing,
+    failures, field, find, format, forward, frame, from, front, full, goal, grasp, gripper, group, handle, heading,
+    height, home, index, input, interrupted, interruptions, item, job, joint, key, kind, label, lane, left, level,
+    lift, light, limit, line, load, location, lock, longest, look, lost, low, mass, measure, median, message, mission,
+    mode, model, motor, move, name, next, node, nothing, number, obstacle, offset, open, order, origin, outcomes,
+    parent, part, path, pause, place, point, points, position, power, priority, progress, queue, quoted, radius,
+    range, rate, reactions, ready, reason, reset, result, right, robot, room, roots, route, run, runs, safe, scan,
+    schedule, schedules, score, search, seconds, send, size, slip, speed, start, state, status, step, stop, stopping,
+    subject, subjects, table, target, task, temperature, text, thread, tick, time, times, tool, total, turn, unit,
+    update, value, velocity, version, wait, wall, watch, weight, what, wheel, who, width, world, zone
   ]
 
-angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, box, brake, call, camera, cancel,
+angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begins, box, brake, call, camera, cancel,
   capacity, cargo, charge, close, color, command, complete, config, contents, count, current, defaults, depth,
-  describe, detailed, did, direction, distance, dock, door, drive, duration, end, entries, failing, field, find,
-  forward, frame, front, full, goal, grasp, gripper, group, handle, heading, height, home, index, input, item, job,
-  joint, key, kind, label, left, level, lift, light, limit, line, load, location, lock, look, low, mass, measure,
-  message, mission, mode, model, motor, move, name, next, node, number, obstacle, offset, open, order, origin, parent,
-  part, path, pause, place, point, points, position, power, priority, progress, queue, radius, range, rate, ready,
-  reason, reset, result, right, robot, room, route, run, safe, scan, schedule, schedules, score, search, seconds,
-  send, size, slip, speed, start, state, status, step, stop, subject, subjects, table, target, task, temperature,
-  text, thread, tick, time, tool, total, turn, unit, update, value, velocity, wait, wall, weight, what, wheel, who,
-  width, world, zone :: String
+  describe, detailed, did, direction, distance, dock, door, drive, duration, end, ends, entries, failing, failures,
+  field, find, format, forward, frame, from, front, full, goal, grasp, gripper, group, handle, heading, height, home,
+  index, input, interrupted, interruptions, item, job, joint, key, kind, label, lane, left, level, lift, light, limit,
+  line, load, location, lock, longest, look, lost, low, mass, measure, median, message, mission, mode, model, motor,
+  move, name, next, node, nothing, number, obstacle, offset, open, order, origin, outcomes, parent, part, path, pause,
+  place, point, points, position, power, priority, progress, queue, quoted, radius, range, rate, reactions, ready,
+  reason, reset, result, right, robot, room, roots, route, run, runs, safe, scan, schedule, schedules, score, search,
+  seconds, send, size, slip, speed, start, state, status, step, stop, stopping, subject, subjects, table, target,
+  task, temperature, text, thread, tick, time, times, tool, total, turn, unit, update, value, velocity, version, wait,
+  wall, watch, weight, what, wheel, who, width, world, zone :: String
 angle = "angle"; area = "area"; argument = "argument"; arm = "arm"; arrived = "arrived"; at = "at"; axis = "axis"
-back = "back"; base = "base"; battery = "battery"; beacon = "beacon"; box = "box"; brake = "brake"; call = "call"
-camera = "camera"; cancel = "cancel"; capacity = "capacity"; cargo = "cargo"; charge = "charge"; close = "close"
-color = "color"; command = "command"; complete = "complete"; config = "config"; contents = "contents"
+back = "back"; base = "base"; battery = "battery"; beacon = "beacon"; begins = "begins"; box = "box"; brake = "brake"
+call = "call"; camera = "camera"; cancel = "cancel"; capacity = "capacity"; cargo = "cargo"; charge = "charge"
+close = "close"; color = "color"; command = "command"; complete = "complete"; config = "config"; contents = "contents"
 count = "count"; current = "current"; defaults = "defaults"; depth = "depth"; describe = "describe"
 detailed = "detailed"; did = "did"; direction = "direction"; distance = "distance"; dock = "dock"; door = "door"
-drive = "drive"; duration = "duration"; end = "end"; entries = "entries"; failing = "failing"; field = "field"
-find = "find"; forward = "forward"; frame = "frame"; front = "front"; full = "full"; goal = "goal"; grasp = "grasp"
-gripper = "gripper"; group = "group"; handle = "handle"; heading = "heading"; height = "height"; home = "home"
-index = "index"; input = "input"; item = "item"; job = "job"; joint = "joint"; key = "key"; kind = "kind"
-label = "label"; left = "left"; level = "level"; lift = "lift"; light = "light"; limit = "limit"; line = "line"
-load = "load"; location = "location"; lock = "lock"; look = "look"; low = "low"; mass = "mass"; measure = "measure"
-message = "message"; mission = "mission"; mode = "mode"; model = "model"; motor = "motor"; move = "move"
-name = "name"; next = "next"; node = "node"; number = "number"; obstacle = "obstacle"; offset = "offset"
-open = "open"; order = "order"; origin = "origin"; parent = "parent"; part = "part"; path = "path"; pause = "pause"
-place = "place"; point = "point"; points = "points"; position = "position"; power = "power"; priority = "priority"
-progress = "progress"; queue = "queue"; radius = "radius"; range = "range"; rate = "rate"; ready = "ready"
-reason = "reason"; reset = "reset"; result = "result"; right = "right"; robot = "robot"; room = "room"
-route = "route"; run = "run"; safe = "safe"; scan = "scan"; schedule = "schedule"; schedules = "schedules"
-score = "score"; search = "search"; seconds = "seconds"; send = "send"; size = "size"; slip = "slip"; speed = "speed"
-start = "start"; state = "state"; status = "status"; step = "step"; stop = "stop"; subject = "subject"
-subjects = "subjects"; table = "table"; target = "target"; task = "task"; temperature = "temperature"; text = "text"
-thread = "thread"; tick = "tick"; time = "time"; tool = "tool"; total = "total"; turn = "turn"; unit = "unit"
-update = "update"; value = "value"; velocity = "velocity"; wait = "wait"; wall = "wall"; weight = "weight"
-what = "what"; wheel = "wheel"; who = "who"; width = "width"; world = "world"; zone = "zone"
+drive = "drive"; duration = "duration"; end = "end"; ends = "ends"; entries = "entries"; failing = "failing"
+failures = "failures"; field = "field"; find = "find"; format = "format"; forward = "forward"; frame = "frame"
+from = "from"; front = "front"; full = "full"; goal = "goal"; grasp = "grasp"; gripper = "gripper"; group = "group"
+handle = "handle"; heading = "heading"; height = "height"; home = "home"; index = "index"; input = "input"
+interrupted = "interrupted"; interruptions = "interruptions"; item = "item"; job = "job"; joint = "joint"; key = "key"
+kind = "kind"; label = "label"; lane = "lane"; left = "left"; level = "level"; lift = "lift"; light = "light"
+limit = "limit"; line = "line"; load = "load"; location = "location"; lock = "lock"; longest = "longest"
+look = "look"; lost = "lost"; low = "low"; mass = "mass"; measure = "measure"; median = "median"; message = "message"
+mission = "mission"; mode = "mode"; model = "model"; motor = "motor"; move = "move"; name = "name"; next = "next"
+node = "node"; nothing = "nothing"; number = "number"; obstacle = "obstacle"; offset = "offset"; open = "open"
+order = "order"; origin = "origin"; outcomes = "outcomes"; parent = "parent"; part = "part"; path = "path"
+pause = "pause"; place = "place"; point = "point"; points = "points"; position = "position"; power = "power"
+priority = "priority"; progress = "progress"; queue = "queue"; quoted = "quoted"; radius = "radius"; range = "range"
+rate = "rate"; reactions = "reactions"; ready = "ready"; reason = "reason"; reset = "reset"; result = "result"
+right = "right"; robot = "robot"; room = "room"; roots = "roots"; route = "route"; run = "run"; runs = "runs"
+safe = "safe"; scan = "scan"; schedule = "schedule"; schedules = "schedules"; score = "score"; search = "search"
+seconds = "seconds"; send = "send"; size = "size"; slip = "slip"; speed = "speed"; start = "start"; state = "state"
+status = "status"; step = "step"; stop = "stop"; stopping = "stopping"; subject = "subject"; subjects = "subjects"
+table = "table"; target = "target"; task = "task"; temperature = "temperature"; text = "text"; thread = "thread"
+tick = "tick"; time = "time"; times = "times"; tool = "tool"; total = "total"; turn = "turn"; unit = "unit"
+update = "update"; value = "value"; velocity = "velocity"; version = "version"; wait = "wait"; wall = "wall"
+watch = "watch"; weight = "weight"; what = "what"; wheel = "wheel"; who = "who"; width = "width"; world = "world"
+zone = "zone"

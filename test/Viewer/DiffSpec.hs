@@ -8,7 +8,7 @@ import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Diff
 import Behavior.Trace.File (relativeTo)
-import Behavior.Trace.Path (path)
+import Behavior.Trace.Path (pathOf)
 import Behavior.Trace.Recording
 import Viewer.Examples
 import Viewer.Generate
@@ -24,16 +24,16 @@ spec = do
     in (firstDivergence d, timesByPath d) === (Nothing, [])
   it "diverge first where the earliest one is" $
     firstDivergence (between mission mended)
-      `shouldBe` Just (Divergence 2.4 (path ["mission", "enter room", "front door"]) 1 "failed: locked" "succeeded")
+      `shouldBe` Just (Divergence 2.4 (pathOf ["mission", "enter room", "front door"]) 1 "failed: locked" "succeeded")
   it "diverge where a failure began, not where it arrived" $
     (divergedPath <$> firstDivergence (between (inEachOther (FailedWith "x")) (inEachOther Succeeded)))
-      `shouldBe` Just (path ["a", "b"])
+      `shouldBe` Just (pathOf ["a", "b"])
   it "diverge where one did not run" $
     firstDivergence (between (one "a" 0 1 ++ one "b" 1 2) (one "a" 0 1))
-      `shouldBe` Just (Divergence 1 (path ["b"]) 1 "succeeded" "did not run")
+      `shouldBe` Just (Divergence 1 (pathOf ["b"]) 1 "succeeded" "did not run")
   it "diverge where two ran in the opposite order" $
     firstDivergence (between (one "a" 0 1 ++ one "b" 1 2) (one "b" 0 1 ++ one "a" 1 2))
-      `shouldBe` Just (Divergence 0 (path ["a"]) 1 "ran before \"b\"" "ran after \"b\"")
+      `shouldBe` Just (Divergence 0 (pathOf ["a"]) 1 "ran before \"b\"" "ran after \"b\"")
   it "do not include the order of branches that run at the same time" $
     firstDivergence (between (one "a" 0 3 ++ one "b" 1 4) (one "b" 0 3 ++ one "a" 1 4)) `shouldBe` Nothing
   it "do not include the values of signals, which are never the same twice" $

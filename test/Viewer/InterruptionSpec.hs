@@ -8,7 +8,9 @@ import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Recording
 import Behavior.Trace.Svg
-import Behavior.Trace.Terminal
+import Behavior.Trace.Terminal.Live (nothingYet, watch)
+import Behavior.Trace.Terminal.Screen (plain)
+import Behavior.Trace.Terminal.Tree
 import Behavior.Trace.Tree
 import Viewer.Xml
 

@@ -26,7 +26,7 @@ spec = do
         ]
   describe "of a span that is its own ancestor" $ do
     it "has it in no other one" $
-      map (spanNumber . nodeSpan) (roots (recording (circle Named))) `shouldBe` [1, 2]
+      map (spanNumber . nodeSpan) (recordingRoots (recording (circle Named))) `shouldBe` [1, 2]
     -- (Span 2 is in 4, 4 in 3, 3 in 2; and 5, which has a name, is in 4.)
     it "ends, also through operators" $
       ending (withoutOperators (circle Operator ++ named')) `shouldReturn` [inside 4]
@@ -38,9 +38,9 @@ spec = do
     it "ends, whatever the events are" . property $ \(Related events) ->
       ioProperty (True <$ ending (withoutOperators events))
   it "has no overflow of the number of lost events" $
-    lost (recording [Lost maxBound, Lost 1, Lost (-5)]) `shouldBe` maxBound
+    recordingLost (recording [Lost maxBound, Lost 1, Lost (-5)]) `shouldBe` maxBound
   it "has times also if one is no number" $
-    let Recording {from = begin} =
+    let Recording {recordingFrom = begin} =
           recording (ended 1 Top "a" (0 / 0) Nothing 3 Succeeded ++ ended 2 Top "b" 1 Nothing (0 / 0) Succeeded)
     in begin `shouldBe` (1 :: Seconds)
  where

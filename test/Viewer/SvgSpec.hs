@@ -125,7 +125,7 @@ arrowsComplete events = conjoin (map complete (reactionsOf events))
   picture = drawn events
   arrows = arrowsOf picture
   markers = [(x + 6, y) | e@(Element "path" _ (_ : _)) <- everything picture, attribute "class" e `elem` ["i", "io"], x : y : _ <- [numbers (attribute "d" e)]]
-  boxOf n = [box m | m <- bars picture, name : more <- [lines (textOf m)], name == spanName s, ("from " ++ secondsText (spanBegan s - from known)) `elem` more]
+  boxOf n = [box m | m <- bars picture, name : more <- [lines (textOf m)], name == spanName s, ("from " ++ secondsText (spanBegan s - recordingFrom known)) `elem` more]
    where
     s = nodeSpan n
   box m = (minimum xs, maximum xs, minimum ys, maximum ys)
@@ -139,7 +139,7 @@ arrowsApart events = counterexample (show xs) (length xs > 50 && and (zipWith (<
   xs = concat [[x, x'] | ((x, y), (x', y')) <- arrowsOf (drawn events), y == y']
 
 reactionsOf :: [Event] -> [Reaction]
-reactionsOf = reactions . recording
+reactionsOf = recordingReactions . recording
 
 -- Where the arrows begin and end, without those of the legend. The two strokes of the head belong to each.
 arrowsOf :: Xml -> [((Double, Double), (Double, Double))]

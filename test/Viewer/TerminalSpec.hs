@@ -12,6 +12,9 @@ import Test.QuickCheck hiding (output)
 
 import Behavior.Trace
 import Behavior.Trace.Terminal
+import Behavior.Trace.Terminal.Live (nothingYet, watch)
+import Behavior.Trace.Terminal.Screen (columns, frame, plain)
+import Behavior.Trace.Terminal.Tree
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden

@@ -50,7 +50,7 @@ spec = do
   it "has a span on a lane inside those only that it really ran in" . withMaxSuccess 1000 . property $
     \(Related events) ->
       let r = recording events
-          outer = Map.fromList (concatMap (surround []) (roots r))
+          outer = Map.fromList (concatMap (surround []) (recordingRoots r))
           surround above n = (name n, above) : concatMap (surround (name n : above)) (nodeChildren n)
           strangers spans =
             [ (a, b)
@@ -131,7 +131,7 @@ spec = do
     it "finds what is no JSON" $ checked "{" `shouldSatisfy` not . null
  where
   render = renderTraceEvents . recording
-  begin Recording {from = t} = t
+  begin Recording {recordingFrom = t} = t
   name = Text.pack . spanName . nodeSpan
   radio event = case event of
     Began s -> spanName s == "radio"

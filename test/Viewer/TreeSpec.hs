@@ -19,7 +19,8 @@ spec = do
   describe "with all kinds of events" (goldenText "detailed-tree.txt" (tree detailed))
   it "has a line for each span and each reaction, and one for what was lost" . property $ \(Related events) ->
     let r = recording events
-    in length (lines (renderTree r)) === 1 + length (nodes r) + length (reactions r) + (if lost r == 0 then 0 else 1)
+    in length (lines (renderTree r))
+        === 1 + length (nodes r) + length (recordingReactions r) + (if recordingLost r == 0 then 0 else 1)
   it "names the part that finished, so that others were stopped" $
     renderTree (recording (beside 5)) `shouldSatisfy` ("listen: stopped: \"look\" finished" `isInfixOf`)
   it "reports lost events also when it has nothing else" $

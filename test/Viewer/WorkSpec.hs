@@ -19,7 +19,9 @@ import Behavior.Trace.File
 import Behavior.Trace.Recording
 import Behavior.Trace.Summary (renderSummary, summary)
 import Behavior.Trace.Svg
-import Behavior.Trace.Terminal
+import Behavior.Trace.Terminal.Live (nothingYet, watch)
+import Behavior.Trace.Terminal.Screen (plain)
+import Behavior.Trace.Terminal.Tree
 import Behavior.Trace.TraceEvents
 import Behavior.Trace.Tree
 import Viewer.Examples

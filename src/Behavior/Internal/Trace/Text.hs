@@ -21,12 +21,12 @@ module Behavior.Internal.Trace.Text
   , howText
   , causeText
   , secondsText
-  , milliseconds
+  , millisecondsText
   , lostText
 
     -- * The user's texts
   , nameText
-  , quoted
+  , quotedText
   , inert
   , inertUpTo
   ) where
@@ -58,10 +58,10 @@ import Behavior.Internal.Trace.Event
 --
 -- @since 0.1.0.0
 plainLine :: Event -> String
-plainLine (Began s) = milliseconds (spanBegan s) ++ " + " ++ nameText (spanName s)
+plainLine (Began s) = millisecondsText (spanBegan s) ++ " + " ++ nameText (spanName s)
 plainLine (Ended s t end) =
-  milliseconds t ++ " - " ++ nameText (spanName s) ++ ": " ++ endText (t - spanBegan s) end
-plainLine (Reacted r) = milliseconds (reactionTime r) ++ " ! " ++ reactionText [] Nothing r
+  millisecondsText t ++ " - " ++ nameText (spanName s) ++ ": " ++ endText (t - spanBegan s) end
+plainLine (Reacted r) = millisecondsText (reactionTime r) ++ " ! " ++ reactionText [] Nothing r
 plainLine (Lost n) = "(" ++ lostText n ++ " here)"
 
 -- | What changed, what the operator stopped, and what it starts: see 'reactionParts'.
@@ -103,7 +103,7 @@ reactionParts spans started r = (changed, maybe [] stopped (reactionStopped r) +
   took b = case stoppingTime (stoppingTook b) ++ although (stoppedEnd b) of
     [] -> ""
     remarks -> " (" ++ intercalate ", " remarks ++ ")"
-  stoppingTime t = ["took " ++ secondsText t | milliseconds t /= milliseconds 0]
+  stoppingTime t = ["took " ++ secondsText t | millisecondsText t /= millisecondsText 0]
   although Succeeded = ["it completed nevertheless"]
   although (StoppedBy _) = []
   although end = ["it " ++ howText end]
@@ -114,7 +114,7 @@ reactionParts spans started r = (changed, maybe [] stopped (reactionStopped r) +
 -- ["stopped its task","stopped \"drive\"","stopped \"drive\", \"film\""]
 stoppedText :: [String] -> StoppedBranch -> String
 stoppedText [] b = "stopped its " ++ nameText (stoppedName b)
-stoppedText names _ = "stopped " ++ upToThree (map quoted names)
+stoppedText names _ = "stopped " ++ upToThree (map quotedText names)
 
 -- The same, and how long they had run at that time: once, if all had run equally long.
 stoppedAfterText :: [(String, Seconds)] -> Seconds -> StoppedBranch -> String
@@ -122,7 +122,7 @@ stoppedAfterText spans time b = case map after spans of
   [] -> stoppedText [] b ++ afterText (stoppedAfter b)
   one : others
     | all (== one) others -> stoppedText (map fst spans) b ++ one
-    | otherwise -> "stopped " ++ upToThree [quoted name ++ after s | s@(name, _) <- spans]
+    | otherwise -> "stopped " ++ upToThree [quotedText name ++ after s | s@(name, _) <- spans]
  where
   -- A span can begin between the decision and its stop.
   after (_, began) = afterText (max 0 (time - began))
@@ -135,7 +135,7 @@ upToThree texts = intercalate ", " known ++ concat [" and " ++ show (length more
 
 -- | What was started, given the name of the span, if there is one, and that of the branch.
 startedText :: Maybe String -> String -> String
-startedText started branch = maybe (nameText branch) quoted started
+startedText started branch = maybe (nameText branch) quotedText started
 
 -- | The same after what was stopped. If nothing was stopped, it says that this is what starts.
 startsText :: Maybe String -> Reaction -> [String]
@@ -224,7 +224,7 @@ siblingText name
   | name == "all" = "all branches"
   | [(_, "")] <- numbers = "branch " ++ name
   | all (`elem` "0123456789, ") name, not (null name) = "branches " ++ name
-  | otherwise = quoted name
+  | otherwise = quotedText name
  where
   numbers = reads name :: [(Int, String)]
 
@@ -246,10 +246,10 @@ secondsText (Seconds s)
 
 -- | A number of seconds with three decimal places.
 --
--- >>> map milliseconds [3.1, -0.0001, 1e12]
+-- >>> map millisecondsText [3.1, -0.0001, 1e12]
 -- ["3.100","0.000","1.000e12"]
-milliseconds :: Seconds -> String
-milliseconds (Seconds t)
+millisecondsText :: Seconds -> String
+millisecondsText (Seconds t)
   | isNaN t || isInfinite t = show t
   | abs t >= 1e9 = showEFloat (Just 3) t ""
   | abs t < 0.0005 = "0.000"
@@ -264,8 +264,8 @@ lostText 1 = "1 event was lost"
 lostText n = show n ++ " events were lost"
 
 -- | A name between quotation marks.
-quoted :: String -> String
-quoted name = "\"" ++ nameText name ++ "\""
+quotedText :: String -> String
+quotedText name = "\"" ++ nameText name ++ "\""
 
 -- | A name: 'inert', and of at most 200 characters.
 --

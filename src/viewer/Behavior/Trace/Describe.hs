@@ -7,14 +7,14 @@ module Behavior.Trace.Describe
     inert
   , inertUpTo
   , nameText
-  , quoted
+  , quotedText
 
     -- * Times
   , secondsText
-  , milliseconds
+  , millisecondsText
 
     -- * What ended, and why
-  , outcome
+  , outcomeText
   , outcomeName
   , endText
   , howText
@@ -35,12 +35,12 @@ import Behavior.Trace
 
 -- | How a span ended, and why.
 --
--- >>> putStrLn (outcome (Just (FailedWith "locked")))
+-- >>> putStrLn (outcomeText (Just (FailedWith "locked")))
 -- failed: locked
 --
 -- @since 0.1.0.0
-outcome :: Maybe End -> String
-outcome = maybe (outcomeName Nothing) howText
+outcomeText :: Maybe End -> String
+outcomeText = maybe (outcomeName Nothing) howText
 
 -- | How a span ended, in a word or two.
 --

@@ -20,8 +20,7 @@ import Behavior.Trace
 import Behavior.Trace.Describe
 import Behavior.Trace.Path
 import Behavior.Trace.Recording
-import Behavior.Trace.Summary (timesOfBoth)
-import qualified Behavior.Trace.Summary as Summary
+import Behavior.Trace.Summary (Times (..), timesOfBoth)
 import Behavior.Trace.Table
 
 -- | The differences.
@@ -68,7 +67,7 @@ data Side = Side
 difference :: Recording -> Recording -> Difference
 difference a b =
   Difference
-    { firstDivergence = case divergences (path []) 0 (items a) (items b) [] of
+    { firstDivergence = case divergences (pathOf []) 0 (items a) (items b) [] of
         [] -> Nothing
         found -> Just (snd (minimumBy (comparing earliest) found))
     , timesByPath =
@@ -79,13 +78,13 @@ difference a b =
           , let (x, y) = (side inFirst, side inSecond)
           , x /= y
           ]
-    , lostOnEachSide = (lost a, lost b)
+    , lostOnEachSide = (recordingLost a, recordingLost b)
     }
  where
   -- At the same time, how something ended comes before what began then; and of a failure and the
   -- failure of its parent, the inner one comes first.
   earliest ((rank, depth), d) = (divergedAt d, rank, Down depth)
-  side = maybe (Side 0 0) (\t -> Side (Summary.runs t) (Summary.total t))
+  side = maybe (Side 0 0) (\t -> Side (timesRuns t) (timesTotal t))
 
 -- A span or a reaction.
 data Item = Item
@@ -98,7 +97,7 @@ data Item = Item
 
 -- Times are relative to the beginning of the recording.
 items :: Recording -> [Item]
-items r = below loose (roots r)
+items r = below loose (recordingRoots r)
  where
   below these found = sortOn itemBegan (map reacted these ++ map ran found)
   ran n =
@@ -124,13 +123,13 @@ items r = below loose (roots r)
    where
     (stopped, started) = IntMap.findWithDefault ([], []) (reactionNumber x) involved
   involved = reactionSpans r
-  start = from r
+  start = recordingFrom r
   (loose, inside) = reactionsInside r
 
 -- Values of signals are left out: those of a sensor are never the same twice.
 withoutValues :: Maybe End -> String
 withoutValues (Just (StoppedBy (SignalChanged _ changes))) = "stopped: " ++ signals changes
-withoutValues end = outcome end
+withoutValues end = outcomeText end
 
 signals :: [Change] -> String
 signals [] = "a signal changed"
@@ -163,8 +162,8 @@ divergences outer depth xs ys rest = foldr compared (reordered ++ rest) (Map.toL
         1
         k
         (min (itemBegan x) (itemBegan y'))
-        ("ran before " ++ quoted (fst k'))
-        ("ran after " ++ quoted (fst k'))
+        ("ran before " ++ quotedText (fst k'))
+        ("ran after " ++ quotedText (fst k'))
     | let common = sortOn (itemBegan . fst . snd) (Map.toList (Map.intersectionWith (,) left right))
     , ((k, (x, y)), (k', (x', y'))) <- zip common (drop 1 common)
     , itemEnded x <= itemBegan x'
@@ -215,10 +214,10 @@ renderDifference d = unlines (remarks ++ diverging ++ [""] ++ taking)
             (timesByPath d)
   row (where', x, y) =
     [ signed (sideTotal y - sideTotal x)
-    , milliseconds (sideTotal x)
-    , milliseconds (sideTotal y)
+    , millisecondsText (sideTotal x)
+    , millisecondsText (sideTotal y)
     , show (sideRuns x)
     , show (sideRuns y)
     , renderPath where'
     ]
-  signed t = (if t > 0 then "+" else "") ++ milliseconds t
+  signed t = (if t > 0 then "+" else "") ++ millisecondsText t

@@ -161,7 +161,7 @@ explainTraceError = \case
   TornHeader -> "line 1: the file ends within its header; " ++ allowed
   ForeignFile begins -> "line 1: this is no trace: " ++ show (inertUpTo 60 begins) ++ "; " ++ allowed
   OtherVersion n ->
-    "line 1: version " ++ inertUpTo 60 (show n) ++ " of the format; allowed: version " ++ show version
+    "line 1: version " ++ inertUpTo 60 (show n) ++ " of the format; allowed: version " ++ show formatVersion
       ++ ". A newer release of behavior-trace may read it"
   DamagedLine n why -> "line " ++ show n ++ ": " ++ inertUpTo 400 why
  where
@@ -195,9 +195,9 @@ parseTrace bytes = case Bytes.split '\n' bytes of
 
 decodeHeader :: Bool -> Bytes.ByteString -> Either TraceError Header
 decodeHeader isLast first = case eitherDecode first of
-  Right (Object o) | Right f <- parseEither (.: "format") o, f == format -> do
+  Right (Object o) | Right f <- parseEither (.: "format") o, f == formatName -> do
     number' <- field o "version"
-    when (number' /= toInteger version) $
+    when (number' /= toInteger formatVersion) $
       if number' < 1 then Left (damaged "version: allowed: 1") else Left (OtherVersion number')
     zero <- field o "zero"
     maybe (Left (damaged "zero: allowed: a time such as \"2026-01-31T12:00:00Z\"")) (Right . Header) (iso8601ParseM zero)

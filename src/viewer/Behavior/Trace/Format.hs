@@ -7,8 +7,8 @@ module Behavior.Trace.Format
   ( -- * The header
     Header (..)
   , encodeHeader
-  , format
-  , version
+  , formatName
+  , formatVersion
 
     -- * Events
   , encodeEvent
@@ -45,21 +45,21 @@ newtype Header = Header
 -- | The version of the format that this module writes and reads.
 --
 -- @since 0.1.0.0
-version :: Int
-version = 1
+formatVersion :: Int
+formatVersion = 1
 
 -- | The first line.
 --
 -- @since 0.1.0.0
 encodeHeader :: Header -> Builder
 encodeHeader (Header zero) =
-  line (pair "format" (text format) <> pair "version" (int version) <> pair "zero" (text (iso8601Show zero)))
+  line (pair "format" (text formatName) <> pair "version" (int formatVersion) <> pair "zero" (text (iso8601Show zero)))
 
 -- | How the header names the format.
 --
 -- @since 0.1.0.0
-format :: String
-format = "behavior-trace"
+formatName :: String
+formatName = "behavior-trace"
 
 -- | The line of an event.
 --

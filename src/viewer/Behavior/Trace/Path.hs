@@ -2,7 +2,7 @@
 -- Where something ran: the names of the spans around it.
 module Behavior.Trace.Path
   ( Path
-  , path
+  , pathOf
   , innermostFirst
   , inPath
   , renderPath
@@ -28,23 +28,23 @@ data Path = Path
 instance Eq Path where
   (==) = (==) `on` innermostFirst
 
--- | As a call of 'path'.
+-- | As a call of 'pathOf'.
 instance Show Path where
-  showsPrec d p = showParen (d > 10) (showString "path " . shows (reverse (innermostFirst p)))
+  showsPrec d p = showParen (d > 10) (showString "pathOf " . shows (reverse (innermostFirst p)))
 
 -- | The path with these names, the outermost first.
 --
--- >>> innermostFirst (path ["mission", "survey"])
+-- >>> innermostFirst (pathOf ["mission", "survey"])
 -- ["survey","mission"]
 --
 -- @since 0.1.0.0
-path :: [String] -> Path
-path = foldl' (flip inPath) (Path 0 [] [])
+pathOf :: [String] -> Path
+pathOf = foldl' (flip inPath) (Path 0 [] [])
 
 -- | The path of what has this name, in what has that path.
 --
--- >>> inPath "survey" (path ["mission"])
--- path ["mission","survey"]
+-- >>> inPath "survey" (pathOf ["mission"])
+-- pathOf ["mission","survey"]
 --
 -- @since 0.1.0.0
 inPath :: String -> Path -> Path
@@ -62,7 +62,7 @@ shownInnermost = 8
 
 -- | The path on one line. Of a long one the middle is left out.
 --
--- >>> putStrLn (renderPath (path ["mission", "survey"]))
+-- >>> putStrLn (renderPath (pathOf ["mission", "survey"]))
 -- mission > survey
 --
 -- @since 0.1.0.0

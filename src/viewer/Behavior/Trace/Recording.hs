@@ -21,7 +21,6 @@ import qualified Data.IntMap.Strict as IntMap
 import qualified Data.IntSet as IntSet
 import Data.List (foldl', sortOn)
 import Data.Maybe (fromMaybe)
-import Prelude hiding (until)
 
 import Behavior.Time (Seconds)
 import Behavior.Trace
@@ -30,15 +29,15 @@ import Behavior.Trace
 --
 -- @since 0.1.0.0
 data Recording = Recording
-  { roots :: [Node]
+  { recordingRoots :: [Node]
   -- ^ The spans that are in no other, in the order of their numbers.
-  , reactions :: [Reaction]
+  , recordingReactions :: [Reaction]
   -- ^ In the order of their numbers.
-  , lost :: !Int
+  , recordingLost :: !Int
   -- ^ How many events were lost.
-  , from :: !Seconds
+  , recordingFrom :: !Seconds
   -- ^ The time of the first event.
-  , until :: !Seconds
+  , recordingUntil :: !Seconds
   -- ^ The time of the last event.
   }
   deriving (Eq, Show)
@@ -62,11 +61,11 @@ data Node = Node
 recording :: [Event] -> Recording
 recording events =
   Recording
-    { roots = fst (IntMap.foldrWithKey' place ([], IntMap.empty) (spansSoFar known))
-    , reactions = IntMap.elems (reactionsSoFar known)
-    , lost = lostSoFar known
-    , from = fromMaybe 0 (earliest known)
-    , until = fromMaybe 0 (latest known)
+    { recordingRoots = fst (IntMap.foldrWithKey' place ([], IntMap.empty) (spansSoFar known))
+    , recordingReactions = IntMap.elems (reactionsSoFar known)
+    , recordingLost = lostSoFar known
+    , recordingFrom = fromMaybe 0 (earliest known)
+    , recordingUntil = fromMaybe 0 (latest known)
     }
  where
   known = foldl' learn (Known IntMap.empty IntMap.empty 0 Nothing Nothing) events
@@ -104,7 +103,7 @@ learn known = \case
 --
 -- @since 0.1.0.0
 nodes :: Recording -> [Node]
-nodes r = foldr below [] (roots r)
+nodes r = foldr below [] (recordingRoots r)
  where
   below n rest = n : foldr below rest (nodeChildren n)
 
@@ -112,16 +111,14 @@ nodes r = foldr below [] (roots r)
 --
 -- @since 0.1.0.0
 nodeUntil :: Recording -> Node -> Seconds
-nodeUntil r = maybe (until' r) fst . nodeEnd
- where
-  until' Recording {until = t} = t
+nodeUntil r = maybe (recordingUntil r) fst . nodeEnd
 
 -- | For each reaction, by its number: the outermost named spans that it stopped, and the named spans
 -- that it started, each in the order of their numbers. The first one that it started comes first.
 --
 -- @since 0.1.0.0
 reactionSpans :: Recording -> IntMap ([Span], [Span])
-reactionSpans r = IntMap.map inOrder (IntMap.fromListWith (<>) (foldr (found IntSet.empty Nothing) [] (roots r)))
+reactionSpans r = IntMap.map inOrder (IntMap.fromListWith (<>) (foldr (found IntSet.empty Nothing) [] (recordingRoots r)))
  where
   inOrder (stopped, started) = (sortOn spanNumber stopped, sortOn spanNumber started)
   -- Given which reactions stopped the named spans around, and which one started the operators around.
@@ -167,7 +164,7 @@ withoutOperators events = concatMap kept events
 reactionsInside :: Recording -> ([Reaction], IntMap [Reaction])
 reactionsInside r = ([x | (Nothing, x) <- found], IntMap.fromListWith (++) [(n, [x]) | (Just n, x) <- reverse found])
  where
-  found = [(parent (reactionParent x), x) | x <- reactions r]
+  found = [(parent (reactionParent x), x) | x <- recordingReactions r]
   parent = \case
     Inside n | IntSet.member n known -> Just n
     _ -> Nothing

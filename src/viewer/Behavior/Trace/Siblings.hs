@@ -6,7 +6,6 @@ module Behavior.Trace.Siblings
   ) where
 
 import qualified Data.Map.Strict as Map
-import Prelude hiding (until)
 
 import Behavior.Trace
 import Behavior.Trace.Recording
@@ -14,7 +13,7 @@ import Behavior.Trace.Recording
 -- | With the name of the span that finished or failed in place of the name of its branch. That is the last one that
 -- ended beside what was stopped, if it ended at the same time: at most a thousandth of the whole earlier.
 withSiblings :: Recording -> Recording
-withSiblings r = r {roots = level (roots r)}
+withSiblings r = r {recordingRoots = level (recordingRoots r)}
  where
   level ns = map one ns
    where
@@ -32,4 +31,4 @@ withSiblings r = r {roots = level (roots r)}
   isFailure (FailedWith _) = True
   isFailure (FaultedWith _) = True
   isFailure _ = False
-  tolerance = (until r - from r) / 1000
+  tolerance = (recordingUntil r - recordingFrom r) / 1000

@@ -30,14 +30,14 @@ import Behavior.Trace.Table
 --
 -- @since 0.1.0.0
 data Summary = Summary
-  { times :: [(Path, Times)]
+  { summaryTimes :: [(Path, Times)]
   -- ^ Of the spans with a name. The largest total comes first.
-  , interruptions :: [(String, Interruptions)]
+  , summaryInterruptions :: [(String, Interruptions)]
   -- ^ By the signal: the last one of a reaction's changes, which the operator watches. An empty name
   -- is that of a signal without a name. The most frequent one comes first.
-  , failures :: [(Path, String, Int)]
-  -- ^ Where, with what (see 'outcome'), and how many times. The most frequent one comes first.
-  , lostEvents :: Int
+  , summaryFailures :: [(Path, String, Int)]
+  -- ^ Where, with what (see 'outcomeText'), and how many times. The most frequent one comes first.
+  , summaryLost :: Int
   -- ^ How many events were lost. If it is not 0, all of this is incomplete.
   }
   deriving (Eq, Show)
@@ -46,12 +46,12 @@ data Summary = Summary
 --
 -- @since 0.1.0.0
 data Times = Times
-  { runs :: Int
-  , total :: Seconds
-  , median :: Seconds
+  { timesRuns :: Int
+  , timesTotal :: Seconds
+  , timesMedian :: Seconds
   -- ^ With an even number of runs: the shorter one of the two in the middle.
-  , longest :: Seconds
-  , outcomes :: [(String, Int)]
+  , timesLongest :: Seconds
+  , timesOutcomes :: [(String, Int)]
   -- ^ How many of the runs had this outcome ('outcomeName'). The most frequent one comes first.
   }
   deriving (Eq, Show)
@@ -60,9 +60,9 @@ data Times = Times
 --
 -- @since 0.1.0.0
 data Interruptions = Interruptions
-  { interrupted :: Int
+  { interruptionsCount :: Int
   -- ^ How many branches it stopped.
-  , stopping :: Seconds
+  , interruptionsTook :: Seconds
   -- ^ How long that took in total, as far as it is known.
   }
   deriving (Eq, Show)
@@ -70,26 +70,27 @@ data Interruptions = Interruptions
 -- | The summary of a recording.
 --
 -- >>> let survey n t = Ended (Span n Top Named "survey" 0 Nothing) t Succeeded
--- >>> times (summary (recording [survey 1 2, survey 2 3, survey 3 7]))
--- [(path ["survey"],Times {runs = 3, total = 12.0, median = 3.0, longest = 7.0, outcomes = [("succeeded",3)]})]
+-- >>> let [(where', t)] = summaryTimes (summary (recording [survey 1 2, survey 2 3, survey 3 7]))
+-- >>> (where', timesRuns t, timesTotal t, timesMedian t, timesLongest t, timesOutcomes t)
+-- (pathOf ["survey"],3,12.0,3.0,7.0,[("succeeded",3)])
 --
 -- @since 0.1.0.0
 summary :: Recording -> Summary
 summary r =
   Summary
-    { times = sortOn (Down . total . snd) [(where', timesOf found) | (where', found) <- byPath]
-    , interruptions = sortOn (\(signal, i) -> (Down (interrupted i), signal)) (Map.toList (bySignal r))
-    , failures =
+    { summaryTimes = sortOn (Down . timesTotal . snd) [(where', timesOf found) | (where', found) <- byPath]
+    , summaryInterruptions = sortOn (\(signal, i) -> (Down (interruptionsCount i), signal)) (Map.toList (bySignal r))
+    , summaryFailures =
         sortOn
           (\(_, _, n) -> Down n)
           [ (where', what, n)
           | (where', found) <- byPath
-          , (what, n) <- counted [outcome end | (_, end@(Just how)) <- found, isFailure how]
+          , (what, n) <- counted [outcomeText end | (_, end@(Just how)) <- found, isFailure how]
           ]
-    , lostEvents = lost r
+    , summaryLost = recordingLost r
     }
  where
-  byPath = flatten (path []) (gather r (roots r)) []
+  byPath = flatten (pathOf []) (gather r (recordingRoots r)) []
   isFailure (FailedWith _) = True
   isFailure (FaultedWith _) = True
   isFailure _ = False
@@ -104,7 +105,7 @@ newtype Level = Level (Map String ([Run], Level))
 --
 -- @since 0.1.0.0
 timesOfBoth :: Recording -> Recording -> [(Path, Maybe Times, Maybe Times)]
-timesOfBoth r s = both (path []) (gather r (roots r)) (gather s (roots s)) []
+timesOfBoth r s = both (pathOf []) (gather r (recordingRoots r)) (gather s (recordingRoots s)) []
  where
   both outer (Level xs) (Level ys) rest = foldr one rest (Map.keys (xs <> ys))
    where
@@ -133,11 +134,11 @@ flatten outer (Level names) rest = Map.foldrWithKey one rest names
 timesOf :: [Run] -> Times
 timesOf found =
   Times
-    { runs = length found
-    , total = sum durations
-    , median = durations !! ((length durations - 1) `div` 2)
-    , longest = last durations
-    , outcomes = counted (map (outcomeName . snd) found)
+    { timesRuns = length found
+    , timesTotal = sum durations
+    , timesMedian = durations !! ((length durations - 1) `div` 2)
+    , timesLongest = last durations
+    , timesOutcomes = counted (map (outcomeName . snd) found)
     }
  where
   durations = sort (map fst found)
@@ -151,7 +152,10 @@ bySignal r =
   signal changes = if null changes then "" else changeSignal (last changes)
   reacted =
     IntMap.fromList
-      [(reactionNumber x, (reactionChanges x, stoppingTook s)) | x <- reactions r, Just s <- [reactionStopped x]]
+      [ (reactionNumber x, (reactionChanges x, stoppingTook s))
+      | x <- recordingReactions r
+      , Just s <- [reactionStopped x]
+      ]
   inferred =
     IntMap.fromList [(n, (changes, 0)) | Just (_, StoppedBy (SignalChanged n changes)) <- map nodeEnd (nodes r)]
 
@@ -167,27 +171,33 @@ counted =
 renderSummary :: Summary -> String
 renderSummary s =
   unlines . intercalate [""] . filter (not . null) $
-    [ [lostRemark (lostEvents s) | lostEvents s /= 0]
-    , table "Time by path" ["runs", "total [s]", "median [s]", "longest [s]", "outcomes", "path"] 4 timesRow (times s)
-    , table "Interruptions by signal" ["count", "stopping took [s]", "signal"] 2 interruptionRow (interruptions s)
-    , table "Failures by path" ["count", "path"] 1 failureRow (failures s)
+    [ [lostRemark (summaryLost s) | summaryLost s /= 0]
+    , table "Time by path" timesHeadings 4 timesRow (summaryTimes s)
+    , table
+        "Interruptions by signal"
+        ["count", "stopping took [s]", "signal"]
+        2
+        interruptionRow
+        (summaryInterruptions s)
+    , table "Failures by path" ["count", "path"] 1 failureRow (summaryFailures s)
     ]
  where
   table title headings numbers row rows
     | null rows = [title ++ ": none"]
     | otherwise = title : columns numbers headings row rows
+  timesHeadings = ["runs", "total [s]", "median [s]", "longest [s]", "outcomes", "path"]
   timesRow (where', t) =
-    [ show (runs t)
-    , milliseconds (total t)
-    , milliseconds (median t)
-    , milliseconds (longest t)
-    , intercalate ", " [what ++ " " ++ percent n (runs t) | (what, n) <- outcomes t]
+    [ show (timesRuns t)
+    , millisecondsText (timesTotal t)
+    , millisecondsText (timesMedian t)
+    , millisecondsText (timesLongest t)
+    , intercalate ", " [what ++ " " ++ percent n (timesRuns t) | (what, n) <- timesOutcomes t]
     , renderPath where'
     ]
   percent n m = show (round (100 * fromIntegral n / fromIntegral m :: Double) :: Int) ++ " %"
   interruptionRow (signal, i) =
-    [ show (interrupted i)
-    , milliseconds (stopping i)
+    [ show (interruptionsCount i)
+    , millisecondsText (interruptionsTook i)
     , if null signal then "a signal without a name" else nameText signal
     ]
   failureRow (where', what, n) = [show n, renderPath where' ++ ": " ++ what]

@@ -13,11 +13,10 @@ import Data.Maybe (fromMaybe, isJust)
 import qualified Data.Text as Text
 import qualified Data.Text.Lazy as Lazy
 import Graphics.Svg.Core (Element)
-import Prelude hiding (until)
 
 import Behavior.Time (Seconds)
 import Behavior.Trace
-import Behavior.Trace.Describe hiding (outcome)
+import Behavior.Trace.Describe
 import Behavior.Trace.Recording
 import Behavior.Trace.Siblings
 import Behavior.Trace.Svg.Draw
@@ -60,7 +59,7 @@ timeline recorded =
     ]
  where
   r = endsOfWaits (withSiblings recorded)
-  placed = place (\n -> (x (spanBegan (nodeSpan n)), x (nodeUntil r n))) (roots r)
+  placed = place (\n -> (x (spanBegan (nodeSpan n)), x (nodeUntil r n))) (recordingRoots r)
   outcomeOf = outcomes r
   drawn = marks outcomeOf 800 placed
   idle = pauses x r placed
@@ -87,17 +86,17 @@ timeline recorded =
   height lane = above lane + barHeight + gap + (if IntSet.member lane higher then 13 else 0)
   higher = IntSet.fromList [labelLane l | l <- texts, labelLinesBelow l > 1]
   bottom = y lanes
-  total = until r - from r
+  total = recordingUntil r - recordingFrom r
   x t = margin + (width - 2 * margin) * max 0 (min 1 (share t))
   share t
-    | total > 0, v <- fromSeconds (t - from r) / fromSeconds total, not (isNaN v) = v
+    | total > 0, v <- fromSeconds (t - recordingFrom r) / fromSeconds total, not (isNaN v) = v
     | otherwise = 0
   tick (t, label) =
     [ shape "gl" (Text.concat ["M", px (x' t), " ", px (axisTop + 6), "V", px bottom])
     , textAt "q c" (x' t) axisTop [("", label)]
     ]
    where
-    x' = x . (from r +) . realToFrac
+    x' = x . (recordingFrom r +) . realToFrac
   -- What is free of texts beside bars.
   free p =
     foldl
@@ -109,7 +108,7 @@ timeline recorded =
     | labelFrom l + labelTo l < a + b = (labelTo l + 2, b)
     | otherwise = (a, labelFrom l - 2)
   drawnPause p = pauseDrawn (free p) (y (pauseLane p)) barHeight p
-  stopRequests = IntMap.fromList [(reactionNumber a, x (reactionTime a)) | a <- reactions r]
+  stopRequests = IntMap.fromList [(reactionNumber a, x (reactionTime a)) | a <- recordingReactions r]
 
 width, margin :: Double
 width = 1200
@@ -171,8 +170,8 @@ aboutSpan limit r n =
   [ inertUpTo limit (nameText (spanName s))
   , case nodeEnd n of
       Just (t, end) -> inertUpTo (limit + 20) (endText (t - spanBegan s) end)
-      Nothing -> "not ended after " ++ secondsText (until r - spanBegan s)
-  , "from " ++ secondsText (spanBegan s - from r)
+      Nothing -> "not ended after " ++ secondsText (recordingUntil r - spanBegan s)
+  , "from " ++ secondsText (spanBegan s - recordingFrom r)
       ++ (if spanParent s == UnknownParent then ", in an unknown span" else "")
   ]
  where

@@ -2,20 +2,6 @@
 -- A trace in the terminal, while it happens.
 module Behavior.Trace.Terminal
   ( withTerminal
-
-    -- * The state, and what is shown of it
-  , Live
-  , nothingYet
-  , watch
-  , treeLines
-  , frame
-
-    -- * Lines
-  , Line
-  , Paint (..)
-  , plain
-  , painted
-  , columns
   ) where
 
 import Control.Concurrent (forkIOWithUnmask)
@@ -31,7 +17,7 @@ import Data.Text.Encoding (decodeUtf8With)
 import Data.Text.Encoding.Error (lenientDecode)
 import GHC.Clock (getMonotonicTime)
 import GHC.IO.Handle (hDuplicate)
-import System.Console.ANSI
+import System.Console.ANSI (hSupportsANSI)
 import System.Console.Terminal.Size (Window (..), hSize)
 import System.Environment (lookupEnv)
 import System.IO
@@ -154,14 +140,3 @@ windowSize h = do
   pure $ case size of
     Just (Window rows wide) | rows > 0, wide > 0 -> (max 1 (rows - 1), max 1 (wide - 1))
     _ -> (23, 79)
-
--- | What is written to replace the frame before, of that number of lines, by these lines. The other
--- arguments say whether there are colours, and what the terminal's encoding makes of a text.
---
--- @since 0.1.0.0
-frame :: Bool -> (String -> String) -> Int -> [Line] -> String
-frame colours safe above tree = up ++ concatMap one tree ++ clearFromCursorToScreenEndCode
- where
-  up = if above > 0 then cursorUpLineCode above else "\r"
-  one line = text [(p, safe t) | (p, t) <- line] ++ clearFromCursorToLineEndCode ++ "\n"
-  text = if colours then painted else plain

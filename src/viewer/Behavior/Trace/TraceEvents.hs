@@ -4,8 +4,6 @@
 -- A recording in the trace-event format, which Perfetto, Chrome (@about:tracing@) and speedscope open.
 module Behavior.Trace.TraceEvents
   ( renderTraceEvents
-  , Placed (..)
-  , placed
   ) where
 
 import Data.Aeson.Encoding (Encoding, int, pair, pairs, unsafeToEncoding)
@@ -41,7 +39,7 @@ import Behavior.Trace.Recording
 renderTraceEvents :: Recording -> Lazy.ByteString
 renderTraceEvents r =
   toLazyByteString $
-    "{\"otherData\":" <> written (pairs (pair "lostEvents" (int (lost r))))
+    "{\"otherData\":" <> written (pairs (pair "lostEvents" (int (recordingLost r))))
       <> ",\"traceEvents\":[\n"
       <> mconcat (intersperse ",\n" (map event entries))
       <> char7 '\n'
@@ -53,18 +51,16 @@ renderTraceEvents r =
   spans = apart (placed r)
   lanes = Set.toList (Set.fromList (map lane spans))
 
--- | A span in its lane. Its times are whole nanoseconds since the beginning of the recording.
---
--- @since 0.1.0.0
+-- A span in its lane. Its times are whole nanoseconds since the beginning of the recording.
 data Placed = Placed
   { lane :: !Int
   , begins :: !Integer
   , ends :: !Integer
   , placedNode :: Node
   , laidIn :: !(Maybe Int)
-  -- ^ The number of the innermost span that it is in, in its lane.
+  -- The number of the innermost span that it is in, in its lane.
   , stoppedInside :: !Bool
-  -- ^ The reaction that stopped it stopped its parent too.
+  -- The reaction that stopped it stopped its parent too.
   }
 
 -- A span, and what it is in: its parent's number and the reaction that stopped that.
@@ -83,15 +79,13 @@ data Nested = Nested
 isIn :: Nested -> Nested -> Bool
 isIn n m = position m < position n && position n <= lastInside m
 
--- | All spans in their lanes, in the order in which they begin. A span is in the lane of its parent,
+-- All spans in their lanes, in the order in which they begin. A span is in the lane of its parent,
 -- unless a sibling is there at that time or the span lasts longer than its parent.
---
--- @since 0.1.0.0
 placed :: Recording -> [Placed]
 placed r = reverse (placedSpans (foldl' place (Lanes 0 IntMap.empty Set.empty IntMap.empty []) ordered))
  where
   -- Of those that begin at the same time, a span comes before those in it.
-  ordered = sortOn (fst . interval) (snd (foldr (within Nothing Nothing) (0, []) (roots r)))
+  ordered = sortOn (fst . interval) (snd (foldr (within Nothing Nothing) (0, []) (recordingRoots r)))
   -- From the last span to the first: its position is the one before that of the first span in it.
   within outer stopping n (next, rest) = (here, Nested (begin, max begin end) n outer stopping here (next - 1) : inner)
    where
@@ -99,7 +93,7 @@ placed r = reverse (placedSpans (foldl' place (Lanes 0 IntMap.empty Set.empty In
     here = after - 1
     begin = nanoseconds (spanBegan (nodeSpan n)) - start
     end = nanoseconds (nodeUntil r n) - start
-  start = nanoseconds (from r)
+  start = nanoseconds (recordingFrom r)
 
 -- In each lane, the spans that have begun and not ended, the innermost first. And when each lane becomes free.
 data Lanes = Lanes
@@ -207,7 +201,7 @@ why p =
         <> pair "ts" (microseconds (ends p - 1))
         <> pair "name" (text reason)
         <> pair "cat" (text "reason")
-  | let reason = outcome (endOf p)
+  | let reason = outcomeText (endOf p)
   , reason /= outcomeName (endOf p)
   ]
 
@@ -236,7 +230,11 @@ flows r spans = concat (zipWith flow [1 ..] interruptions)
   -- When the operator decided. A viewer looks for the span in which the flow begins; at its very end
   -- it finds none, and just before that the instant event.
   leaves n p = max (begins p) (min (ends p - 2) (IntMap.findWithDefault (ends p) n decided))
-  decided = IntMap.fromList [(reactionNumber x, nanoseconds (reactionTime x) - nanoseconds (from r)) | x <- reactions r]
+  decided =
+    IntMap.fromList
+      [ (reactionNumber x, nanoseconds (reactionTime x) - nanoseconds (recordingFrom r))
+      | x <- recordingReactions r
+      ]
   flow :: Int -> (Int, Placed, Placed, Integer) -> [Encoding]
   flow n (_, stopped, started, at) =
     [ pairs (pair "ph" (text "s") <> common n (lane stopped) at)

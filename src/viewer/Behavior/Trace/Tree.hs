@@ -7,7 +7,6 @@ module Behavior.Trace.Tree
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (sortOn)
 import Data.Maybe (listToMaybe)
-import Prelude hiding (until)
 
 import Behavior.Time (Seconds)
 import Behavior.Trace
@@ -32,14 +31,14 @@ import Behavior.Trace.Siblings
 --
 -- @since 0.1.0.0
 renderTree :: Recording -> String
-renderTree recorded = unlines (heading : inOrder (map (reaction 0) loose ++ map (branch 0) (roots r)) remark)
+renderTree recorded = unlines (heading : inOrder (map (reaction 0) loose ++ map (branch 0) (recordingRoots r)) remark)
  where
   r = withSiblings recorded
   heading = row "begin [s]" "took [s]" ""
   branch :: Int -> Node -> Part
   branch depth node =
     ( spanBegan s
-    , (row (milliseconds (spanBegan s)) (milliseconds (nodeUntil r node - spanBegan s)) (indented depth (title node)) :)
+    , (row (millisecondsText (spanBegan s)) (millisecondsText took) (indented depth (title node)) :)
         . inOrder
           ( map (reaction (depth + 1)) (IntMap.findWithDefault [] (spanNumber s) inside)
               ++ map (branch (depth + 1)) (nodeChildren node)
@@ -47,13 +46,17 @@ renderTree recorded = unlines (heading : inOrder (map (reaction 0) loose ++ map 
     )
    where
     s = nodeSpan node
-  reaction depth x = (reactionTime x, (row (milliseconds (reactionTime x)) "" (indented depth ("! " ++ described x)) :))
+    took = nodeUntil r node - spanBegan s
+  reaction depth x =
+    ( reactionTime x
+    , (row (millisecondsText (reactionTime x)) "" (indented depth ("! " ++ described x)) :)
+    )
   described x = reactionText [(spanName s, spanBegan s) | s <- stopped] (spanName <$> listToMaybe started) x
    where
     (stopped, started) = IntMap.findWithDefault ([], []) (reactionNumber x) involved
   involved = reactionSpans r
   (loose, inside) = reactionsInside r
-  remark = [lostRemark (lost r) | lost r /= 0]
+  remark = [lostRemark (recordingLost r) | recordingLost r /= 0]
 
 -- When it was, and its lines, before those that follow. (Lists of lines would be copied at each level.)
 type Part = (Seconds, [String] -> [String])
@@ -62,7 +65,7 @@ inOrder :: [Part] -> [String] -> [String]
 inOrder parts rest = foldr snd rest (sortOn fst parts)
 
 title :: Node -> String
-title node = nameText (spanName s) ++ ": " ++ outcome (snd <$> nodeEnd node) ++ kind ++ origin
+title node = nameText (spanName s) ++ ": " ++ outcomeText (snd <$> nodeEnd node) ++ kind ++ origin
  where
   s = nodeSpan node
   kind = case spanKind s of

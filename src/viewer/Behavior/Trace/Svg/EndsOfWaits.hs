@@ -6,7 +6,6 @@ module Behavior.Trace.Svg.EndsOfWaits
 
 import qualified Data.IntMap.Strict as IntMap
 import qualified Data.Map.Strict as Map
-import Prelude hiding (until)
 
 import Behavior.Trace
 import Behavior.Trace.Describe
@@ -16,11 +15,11 @@ import Behavior.Trace.Recording
 -- ended: such a branch waits (a rule that has done its work, until its condition no longer holds). Only if something
 -- with a name starts, and the branch stopped at once. What a branch contains is known if a reaction started it.
 endsOfWaits :: Recording -> Recording
-endsOfWaits r = r {reactions = map ended (reactions r)}
+endsOfWaits r = r {recordingReactions = map ended (recordingReactions r)}
  where
   ended x = case (reactionStopped x, IntMap.lookup (reactionNumber x) involved) of
     (Just b@StoppedBranch {stoppedEnd = StoppedBy _}, Just ([], _ : _))
-      | milliseconds (stoppingTook b) == milliseconds 0, hadNames x b -> x {reactionStopped = Nothing}
+      | millisecondsText (stoppingTook b) == millisecondsText 0, hadNames x b -> x {reactionStopped = Nothing}
     _ -> x
   involved = reactionSpans r
   -- A branch begins when the reaction that starts it has stopped the one before, up to a thousandth of the whole.
@@ -30,12 +29,12 @@ endsOfWaits r = r {reactions = map ended (reactions r)}
    where
     began = reactionTime x - stoppedAfter b
     branch = (reactionParent x, reactionOperator x, stoppedName b)
-  tolerance = (until r - from r) / 1000
+  tolerance = (recordingUntil r - recordingFrom r) / 1000
   starting =
     Map.fromListWith
       Map.union
       [ ((reactionParent x, reactionOperator x, name), Map.singleton at (reactionNumber x))
-      | x <- reactions r
+      | x <- recordingReactions r
       , let at = reactionTime x + maybe 0 stoppingTook (reactionStopped x)
       , Just name <- [reactionStarts x]
       ]

@@ -10,7 +10,6 @@ module Behavior.Trace.Svg.Header
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (intercalate)
 import Data.Maybe (isJust, maybeToList)
-import Prelude hiding (until)
 
 import Behavior.Trace
 import Behavior.Trace.Describe
@@ -24,7 +23,7 @@ title outcomeOf width r = filter (not . null . snd) [("", lead), ("tr", fitted r
  where
   (known, remarks) = heading outcomeOf r
   lead = fitted (width / 1.68 - textWidth missing) known
-  missing = if lost r > 0 then lostText (lost r) else ""
+  missing = if recordingLost r > 0 then lostText (recordingLost r) else ""
   large text = 1.68 * textWidth text + 7
   room = (width - large lead - large missing) * 12 / 14
 
@@ -44,13 +43,13 @@ heading outcomeOf r = (if null remarks then lead else lead ++ ":", intercalate "
       ( unwords [nameUpTo 60 n, ending n, "after", secondsText (nodeUntil r n - spanBegan (nodeSpan n))]
       , filter (not . same n) (nodes r)
       )
-    Nothing -> (secondsText (until r - from r) ++ " in all", nodes r)
+    Nothing -> (secondsText (recordingUntil r - recordingFrom r) ++ " in all", nodes r)
   remarks =
     ["interrupted " ++ times interruptions | interruptions > 0]
       ++ zipWith (\(n, how) these -> show n ++ these ++ how) counted (ofParts : repeat " ")
       ++ [secondsText again ++ " of work redone" | again > 0]
   ofParts = " of " ++ some (length parts) "part" ++ " "
-  interruptions = length (filter (isJust . reactionStopped) (reactions r))
+  interruptions = length (filter (isJust . reactionStopped) (recordingReactions r))
   counted = [(n, how) | (o, how) <- remarked, let n = count o, n > 0]
   remarked = [(Failure, "failed"), (Fault, "faulted"), (Running, "not ended")]
   count o = length (filter ((o ==) . outcomeOf) parts)
@@ -61,7 +60,9 @@ heading outcomeOf r = (if null remarks then lead else lead ++ ":", intercalate "
   endedBy x =
     intercalate " → " $
       inertUpTo 60 (changesText [c {changeBefore = Nothing} | c <- lastOf (changedOnly (reactionChanges x))])
-        : [quoted (inertUpTo 40 (spanName s)) | (_, s : _) <- maybeToList (IntMap.lookup (reactionNumber x) involved)]
+        : [ quotedText (inertUpTo 40 (spanName s))
+          | (_, s : _) <- maybeToList (IntMap.lookup (reactionNumber x) involved)
+          ]
   involved = reactionSpans r
   again = redone outcomeOf r
   lastOf = take 1 . reverse
@@ -72,7 +73,7 @@ nameUpTo limit = inertUpTo limit . nameText . spanName . nodeSpan
 
 -- The only span that is in no other.
 outermost :: Recording -> Maybe Node
-outermost r = case (filter ((Top ==) . spanParent . nodeSpan) (roots r), roots r) of
+outermost r = case (filter ((Top ==) . spanParent . nodeSpan) (recordingRoots r), recordingRoots r) of
   ([n], _) -> Just n
   (_, [n]) -> Just n
   _ -> Nothing

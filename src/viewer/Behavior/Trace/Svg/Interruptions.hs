@@ -27,7 +27,7 @@ import Graphics.Svg.Core (Element)
 import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Describe
-import Behavior.Trace.Recording (Node (..), Recording (reactions), reactionSpans)
+import Behavior.Trace.Recording (Node (..), Recording (recordingReactions), reactionSpans)
 import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Layout
 import Behavior.Trace.Svg.Rows
@@ -89,7 +89,7 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
   rowY m row = y (markerLane m) - aboveBars - rowHeight * fromIntegral (rows - row) + 9
    where
     rows = maybe 0 rowCount (IntMap.lookup (markerLane m) byLane)
-  shown = filter visible (reactions recorded)
+  shown = filter visible (recordingReactions recorded)
   visible r = isJust (reactionStopped r) || IntMap.member (reactionNumber r) started
   stopped = outermost [(n, p) | p <- placed, Just (_, StoppedBy (SignalChanged n _)) <- [nodeEnd (placedNode p)]]
   started = outermost [(n, p) | p <- placed, Just n <- [spanReaction (nodeSpan (placedNode p))]]

@@ -48,7 +48,7 @@ outcomes r = outcome
 
 -- The numbers of the spans that succeeded in a span that did not, and of whose name one began after that span's end.
 ranAgain :: Recording -> IntSet.IntSet
-ranAgain r = IntSet.fromList (foldr (found Nothing) [] (roots r))
+ranAgain r = IntSet.fromList (foldr (found Nothing) [] (recordingRoots r))
  where
   found :: Maybe Seconds -> Node -> [Int] -> [Int]
   found lostAt n rest =
@@ -77,13 +77,13 @@ lastBegins r = Map.fromListWith max [(spanName s, spanBegan s) | s <- map nodeSp
 -- what ran in the span, and after that nothing ran there but the emergency of 'Behavior.Signal.insteadWhen', from
 -- which there is no way back.
 endedBySignals :: Recording -> IntMap Reaction
-endedBySignals r = foldr below IntMap.empty (roots r)
+endedBySignals r = foldr below IntMap.empty (recordingRoots r)
  where
   interrupted =
     IntMap.fromListWith
       latest
       [ (n, x)
-      | x <- reactions r
+      | x <- recordingReactions r
       , Inside n <- [reactionParent x]
       , Just b <- [reactionStopped x]
       , stoppedEnd b /= Succeeded
@@ -111,7 +111,7 @@ redone :: (Node -> Outcome) -> Recording -> Seconds
 redone outcomeOf r =
   sum
     [ t - spanBegan s
-    | n <- snd (foldr leaves (False, []) (roots r))
+    | n <- snd (foldr leaves (False, []) (recordingRoots r))
     , let s = nodeSpan n
     , Just (t, end) <- [nodeEnd n]
     , isLost n end

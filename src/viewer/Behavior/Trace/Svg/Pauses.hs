@@ -63,7 +63,7 @@ pauses x r placed = take 300 (concatMap inSpan placed)
     IntMap.fromListWith
       (++)
       [ (n, [(reactionTime a, a)])
-      | a <- sortOn (\a -> Down (reactionTime a, reactionNumber a)) (reactions r)
+      | a <- sortOn (\a -> Down (reactionTime a, reactionNumber a)) (recordingReactions r)
       , reactionOperator a /= "monitor"
       , Inside n <- [reactionParent a]
       , Nothing <- [reactionStopped a]

@@ -1,7 +1,7 @@
 {-# LANGUAGE OverloadedStrings #-}
 
 -- |
--- The line below the title of a timeline: where most of the time went.
+-- The line below the title of a timeline: where the time went.
 module Behavior.Trace.Svg.TimeSpent
   ( whereTimeWent
   ) where
@@ -9,8 +9,8 @@ module Behavior.Trace.Svg.TimeSpent
 import Data.Char (isDigit)
 import Data.List (dropWhileEnd, intercalate, sortOn)
 import qualified Data.Map.Strict as Map
+import Data.Maybe (fromMaybe)
 import Data.Ord (Down (..))
-import Prelude hiding (until)
 
 import Behavior.Time (Seconds)
 import Behavior.Trace
@@ -31,7 +31,7 @@ whereTimeWent :: Double -> Recording -> [Part]
 whereTimeWent width r =
   ("q", lead) : last (fallback' : take 1 (filter ((<= width) . partsWidth . (("q", lead) :)) texts))
  where
-  (taken, total, sideBySide) = maybe (mostOf r, until r - from r, 0) (\(t, whole, n) -> (t, whole, n)) (sideBySideOf r)
+  (taken, total, sideBySide) = fromMaybe (mostOf r, recordingUntil r - recordingFrom r, 0) (sideBySideOf r)
   lead = case listed of
     _ | sideBySide > 0 -> show sideBySide ++ " side by side, together " ++ secondsText total ++ ":"
     Taken _ t _ : _ : _ | t < 0.2 * total -> "spread over " ++ some (length listed) "part" ++ ", the longest:"
@@ -95,7 +95,7 @@ mostFirst = sortOn (\(Taken _ t _) -> Down t)
 
 -- The parts of those that run side by side, the sum of the times of these, and how many they are.
 sideBySideOf :: Recording -> Maybe ([Taken], Seconds, Int)
-sideBySideOf r = level (roots r)
+sideBySideOf r = level (recordingRoots r)
  where
   level [n] = level (nodeChildren n)
   level ns
@@ -113,7 +113,7 @@ sideBySideOf r = level (roots r)
 -- The names that took time, those that took most of it first. Where one name took nearly all of it, those in
 -- its spans, and the time that they leave of it. Where there are many names that took little, those in them.
 mostOf :: Recording -> [Taken]
-mostOf r = level [] (roots r)
+mostOf r = level [] (recordingRoots r)
  where
   level itself ns
     | [Taken _ t same] <- filter dominates (byName r ns) =
@@ -126,7 +126,7 @@ mostOf r = level [] (roots r)
   dominates (Taken _ t same) = t >= 0.9 * total && total > 0 && not (null (inner same))
   inner = concatMap nodeChildren
   sumOf taken = sum [t | Taken _ t _ <- take 4 taken]
-  total = until r - from r
+  total = recordingUntil r - recordingFrom r
 
 byName :: Recording -> [Node] -> [Taken]
 byName r ns = [Taken name (covered r same) same | (name, same) <- Map.toList known]

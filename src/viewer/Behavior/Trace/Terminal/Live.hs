@@ -1,3 +1,5 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- What is known while events still come: what runs, and a little of what has ended. It takes
 -- bounded memory, however many events come.

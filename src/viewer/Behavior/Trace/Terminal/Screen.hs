@@ -1,3 +1,5 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- Lines of text for a window of a terminal: how many columns they take, and their colours.
 module Behavior.Trace.Terminal.Screen
@@ -12,6 +14,9 @@ module Behavior.Trace.Terminal.Screen
   , columns
   , cutTo
   , cutLine
+
+    -- * Frames
+  , frame
   ) where
 
 import Data.Char (GeneralCategory (..), generalCategory)
@@ -21,6 +26,9 @@ import System.Console.ANSI
   , ConsoleIntensity (..)
   , ConsoleLayer (..)
   , SGR (..)
+  , clearFromCursorToLineEndCode
+  , clearFromCursorToScreenEndCode
+  , cursorUpLineCode
   , setSGRCode
   )
 
@@ -145,3 +153,14 @@ cutLine n line
   fill left (c : cs)
     | charColumns c <= left, (known, left', whole) <- fill (left - charColumns c) cs = (c : known, left', whole)
     | otherwise = ([], left, False)
+
+-- | What is written to replace the frame before, of that number of lines, by these lines. The other
+-- arguments say whether there are colours, and what the terminal's encoding makes of a text.
+--
+-- @since 0.1.0.0
+frame :: Bool -> (String -> String) -> Int -> [Line] -> String
+frame colours safe above tree = up ++ concatMap one tree ++ clearFromCursorToScreenEndCode
+ where
+  up = if above > 0 then cursorUpLineCode above else "\r"
+  one line = text [(p, safe t) | (p, t) <- line] ++ clearFromCursorToLineEndCode ++ "\n"
+  text = if colours then painted else plain

@@ -1,3 +1,5 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
 -- |
 -- What is known at a moment, as the lines of a tree.
 module Behavior.Trace.Terminal.Tree
