@@ -358,9 +358,11 @@ reactions = do
                  , [Change "condition" (Just "False") "True"]
                  , [Change "battery" (Just "1") "0"]
                  ]
-    for_ places $ \place -> (,) (placeName place) <$> inPlaceOf (placed place) `shouldReturn` (placeName place, expected)
+    for_ places $ \place ->
+      (,) (placeName place) <$> inPlaceOf (placed place) `shouldReturn` (placeName place, expected)
     inPlaceOf (\act -> newTVarIO [()] >>= (`resumable` const act)) `shouldReturn` expected
-    inPlaceOf (\act -> withTrace [] (named "outer" (adopt >>= \here -> withAsync (here act) wait))) `shouldReturn` expected
+    inPlaceOf (\act -> withTrace [] (named "outer" (adopt >>= \here -> withAsync (here act) wait)))
+      `shouldReturn` expected
 
   it "shows names and values also of signals that were shared before the trace began" $
     for_
