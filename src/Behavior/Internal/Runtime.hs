@@ -100,6 +100,7 @@ import Behavior.Internal.Trace.Span (branchSpan)
 -- publishes it writes nothing else, and a branch would take more bytes.)
 data Thread r = Thread
   { threadId :: !ThreadId
+  -- ^ The thread itself.
   , threadResult :: {-# UNPACK #-} !(TVar (Maybe r))
   -- ^ Nothing until it has ended, cleanup included.
   }
