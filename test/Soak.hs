@@ -9,8 +9,7 @@
 -- specification, and with their traces. Without a number of seconds only the first round is run.
 module Main (main) where
 
-import Control.Monad (forM, forM_, unless, when)
-import Data.Maybe (catMaybes)
+import Control.Monad (forM, unless, when)
 import GHC.Clock (getMonotonicTime)
 import Numeric (showFFloat)
 import System.Environment (getArgs)
