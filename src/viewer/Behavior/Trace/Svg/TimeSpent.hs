@@ -35,7 +35,7 @@ whereTimeWent width r =
   lead = case listed of
     _ | sideBySide > 0 -> show sideBySide ++ " side by side, together " ++ secondsText total ++ ":"
     Taken _ t _ : _ : _ | t < 0.2 * total -> "spread over " ++ some (length listed) "part" ++ ", the longest:"
-    _ -> "most of the time:"
+    _ -> "time:"
   fallback' = last ([("", "nothing took time")] : texts)
   texts =
     [ shown k (rest k)
