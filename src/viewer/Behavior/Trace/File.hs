@@ -77,7 +77,8 @@ withTraceFile path action = closing $ \file broken -> do
         bytes <- evaluate (Bytes.toStrict (toLazyByteString lines'))
         withMVar lock $ \() -> do
           readIORef broken >>= \is -> when is (throwIO (userError (path ++ ": an earlier event could not be written")))
-          naming (unsafeUseAsCStringLen bytes (\(start, size) -> write file (castPtr start) 0 size)) `onException` writeIORef broken True
+          naming (unsafeUseAsCStringLen bytes (\(start, size) -> write file (castPtr start) 0 size))
+            `onException` writeIORef broken True
   add (encodeHeader header)
   action (add . foldMap (encodeEvent . relativeTo zero))
  where
@@ -102,8 +103,9 @@ renderTrace header events = toLazyByteString (encodeHeader header <> foldMap enc
 -- | The event as it is for a clock whose zero is at the given time, in whole nanoseconds. Durations
 -- stay as they are.
 --
--- >>> relativeTo 100 (Ended (Span 1 Top Named "survey" 103.1 Nothing) 104 (StoppedBy (TimeLimit 0.9)))
--- Ended (Span {spanNumber = 1, spanParent = Top, spanKind = Named, spanName = "survey", spanBegan = 3.1, spanReaction = Nothing}) 4.0 (StoppedBy (TimeLimit 0.9))
+-- >>> let ended = Ended (Span 1 Top Named "survey" 103.1 Nothing) 104 (StoppedBy (TimeLimit 0.9))
+-- >>> [(spanBegan s, t, end) | Ended s t end <- [relativeTo 100 ended]]
+-- [(3.1,4.0,StoppedBy (TimeLimit 0.9))]
 --
 -- @since 0.1.0.0
 relativeTo :: Seconds -> Event -> Event
@@ -185,8 +187,11 @@ parseTrace bytes = case Bytes.split '\n' bytes of
     [] -> Right (reverse before, Nothing)
     [end] | Bytes.null end -> Right (reverse before, Nothing)
     content : after -> case decodeEvent content of
-      Right (Lost more) | more > maxBound - lostBefore -> Left (DamagedLine n "more events were lost than can be counted")
-      Right this | (this', texts') <- sharing texts this -> go (n + 1) texts' (lostBefore + lostIn this) (this' : before) after
+      Right (Lost more)
+        | more > maxBound - lostBefore -> Left (DamagedLine n "more events were lost than can be counted")
+      Right this
+        | (this', texts') <- sharing texts this ->
+            go (n + 1) texts' (lostBefore + lostIn this) (this' : before) after
       Left (NotJson _) | null after -> Right (reverse before, Just (TornLine n (fromIntegral (Bytes.length content))))
       Left (NotJson why) -> Left (DamagedLine n ("this is not a line of JSON: " ++ why))
       Left (NotAnEvent why) -> Left (DamagedLine n ("this is no event: " ++ why))
@@ -200,7 +205,10 @@ decodeHeader isLast first = case eitherDecode first of
     when (number' /= toInteger formatVersion) $
       if number' < 1 then Left (damaged "version: allowed: 1") else Left (OtherVersion number')
     zero <- field o "zero"
-    maybe (Left (damaged "zero: allowed: a time such as \"2026-01-31T12:00:00Z\"")) (Right . Header) (iso8601ParseM zero)
+    maybe
+      (Left (damaged "zero: allowed: a time such as \"2026-01-31T12:00:00Z\""))
+      (Right . Header)
+      (iso8601ParseM zero)
   -- (Of a device that never ends, the end of its first line is not looked for.)
   Left _ | begin `Bytes.isPrefixOf` first || first `Bytes.isPrefixOf` begin, isLast -> Left TornHeader
   Left why | begin `Bytes.isPrefixOf` first -> Left (damaged why)

@@ -88,12 +88,13 @@ data Known = Known
 
 learn :: Known -> Event -> Known
 learn known = \case
-  Began s -> at (spanBegan s) known {spansSoFar = IntMap.insertWith began (spanNumber s) (s, Nothing) (spansSoFar known)}
-  Ended s t end -> at t (at (spanBegan s) known {spansSoFar = IntMap.insert (spanNumber s) (s, Just (t, end)) (spansSoFar known)})
+  Began s -> at (spanBegan s) (spanned (IntMap.insertWith began) s Nothing)
+  Ended s t end -> at t (at (spanBegan s) (spanned IntMap.insert s (Just (t, end))))
   Reacted r -> at (reactionTime r) known {reactionsSoFar = IntMap.insert (reactionNumber r) r (reactionsSoFar known)}
   -- (An overflow would make it negative.)
   Lost n -> known {lostSoFar = if n > maxBound - lostSoFar known then maxBound else lostSoFar known + max 0 n}
  where
+  spanned put s end = known {spansSoFar = put (spanNumber s) (s, end) (spansSoFar known)}
   began (s, _) (_, end) = (s, end)
   at t k
     | t /= t = k
@@ -118,7 +119,8 @@ nodeUntil r = maybe (recordingUntil r) fst . nodeEnd
 --
 -- @since 0.1.0.0
 reactionSpans :: Recording -> IntMap ([Span], [Span])
-reactionSpans r = IntMap.map inOrder (IntMap.fromListWith (<>) (foldr (found IntSet.empty Nothing) [] (recordingRoots r)))
+reactionSpans r =
+  IntMap.map inOrder (IntMap.fromListWith (<>) (foldr (found IntSet.empty Nothing) [] (recordingRoots r)))
  where
   inOrder (stopped, started) = (sortOn spanNumber stopped, sortOn spanNumber started)
   -- Given which reactions stopped the named spans around, and which one started the operators around.
