@@ -57,7 +57,7 @@ import Control.Concurrent.MVar
 import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Concurrent.STM.TVar (mkWeakTVar)
 import Control.Exception (bracket, finally, uninterruptibleMask_)
-import Control.Monad (filterM, unless, void, when)
+import Control.Monad (filterM, join, unless, void, when)
 import Data.Foldable (for_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef)
 import Data.Maybe (catMaybes, fromMaybe)
@@ -148,7 +148,7 @@ enter = do
 leave :: (Int, TVar State) -> IO ()
 leave (n, state) = do
   current <- process
-  handled <- uninterruptibleMask_ $ do
+  join . uninterruptibleMask_ $ do
     -- (E)
     allAnswered
     modifyMVar current $ \known -> do
@@ -156,7 +156,6 @@ leave (n, state) = do
       let others = filter ((/= n) . fst) (runs known)
           left = known {runs = others, pending = if end == Taken then Nothing else pending known}
       if null (runs left) then restore left else pure (left, pure ())
-  handled
   allAnswered
   withMVar current (const (pure ()))
  where
