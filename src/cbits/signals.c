@@ -40,7 +40,8 @@ static void on_signal(int signal, siginfo_t *info, void *context)
     long before = 0;
     int first;
     clock_gettime(CLOCK_MONOTONIC, &t);
-    first = __atomic_compare_exchange_n(&unanswered_since, &before, t.tv_sec + 1, 0, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);
+    first = __atomic_compare_exchange_n(
+        &unanswered_since, &before, t.tv_sec + 1, 0, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);
     /* (In this order: whoever sets at_rest reads unanswered_since afterwards.) */
     if (__atomic_load_n(&at_rest[signal], __ATOMIC_SEQ_CST)) {
         end_by(signal);
