@@ -1,9 +1,12 @@
+{-# LANGUAGE LambdaCase #-}
+
 -- |
 -- Tests that would pass because they test nothing: each is an error that says what to do.
 module Sim.VacuousSpec (spec) where
 
+import Control.Concurrent (threadDelay)
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
-import Control.Exception (ErrorCall (..))
+import Control.Exception (ErrorCall (..), finally)
 import Control.Monad (void, when)
 import Data.Foldable (for_)
 import Data.IORef (modifyIORef, newIORef, readIORef)
@@ -58,6 +61,28 @@ worlds = do
     (world, drive, _) <- rover
     void (simulate (begin world >> pure () ? drive))
     world `shouldRecord` never (startOf "drive")
+  it "fails an exploration that uses one world in all its runs, also if the property catches that" $
+    for_ [id, \property simulating -> property simulating `catchAny` \_ -> pure ()] $ \whole -> do
+      (_, drive, _) <- rover
+      tryExplore (randomly 5) (whole (\simulating -> void (simulating drive)))
+        `shouldFailWith` "started in another simulation"
+  it "fails an exploration whose property has used it outside of the simulation" $ do
+    tryExplore (randomly 5) (\simulating -> do
+        (world, _, _) <- rover
+        begin world
+        void (simulating (sleep 1))
+        world `shouldRecord` never (startOf "drive"))
+      `shouldFailWith` "started outside of the simulation"
+    tryExplore (randomly 5) (\simulating -> do
+        world <- newMock
+        orders <- driver world "orders" [(1, "tea")]
+        withInbox 9 orders $ \inbox -> void (simulating (onMessage inbox (\_ -> pure (pure ())) (sleep 60)))
+        world `shouldRecord` never (noted "served"))
+      `shouldFailWith` "started outside of the simulation"
+  it "is not used by what only the unwinding of a run does with it" $ do
+    (world, drive, _) <- rover
+    void (simulateWith defaultSimOptions {endAt = 1} (sleep 5 `finally` drive))
+    (world `shouldRecord` never (startOf "drive")) `shouldThrow` \(BrokenClaim why) -> "begin it" `isInfixOf` why
   it "is used again and again in reality" $ do
     world <- newMock
     wave <- action world "wave" [succeeds]
@@ -89,6 +114,16 @@ explorations = do
     $ \(name, t, with) -> it ("is refused, when a run has the " ++ name ++ " " ++ show t) $
         simulateWith (with t defaultSimOptions) (sleep 1)
           `shouldThrow` (== ErrorCall (name ++ ": a duration is zero or more seconds, not " ++ show t))
+  it "fails, when its property catches that a run is not valid, or that it simulates twice" $ do
+    let caught property simulating = property simulating `catchAny` \_ -> pure ()
+    tryExplore (randomly 2) (caught (\simulating -> void (simulating (threadDelay 700000))))
+      `shouldFailWith` "threadDelay"
+    tryExplore (randomly 2) (caught (\simulating -> simulating (pure ()) >> void (simulating (pure ()))))
+      `shouldFailWith` "simulates only once"
+  it "fails, when its property returns an error that nothing has evaluated" $
+    tryExplore (randomly 2) (\simulating -> error "late" <$ simulating (pure ())) `shouldFailWith` "late"
+  it "is refused, when its limit is negative" $
+    simulateWith defaultSimOptions {livelockLimit = -1} (pure ()) `shouldThrow` saying "livelockLimit"
   it "is refused, when its property simulates nothing under one of the schedules" $ do
     runs <- newIORef (0 :: Int)
     let thrice simulated = modifyIORef runs (+ 1) >> readIORef runs >>= \n -> when (n < 3) (void (simulated (sleep 1)))
@@ -122,6 +157,13 @@ coverage = do
     report <- exploring (\drive honk charge -> (drive ||| honk) >> charge 'x')
     reportNeverStarted report `shouldBe` []
     show report `shouldNotContain` "never"
+  it "names an action also when one has been started whose name begins like it" $ do
+    report <- explore (randomly 2) $ \simulating -> do
+      world <- newMock
+      _ <- action world "drive" [succeeds]
+      home <- action world "drive home" [succeeds]
+      void (simulating home)
+    reportNeverStarted report `shouldBe` ["drive"]
   it "knows an action that only some schedules start" $ do
     -- The right branch honks, unless it is stopped before.
     report <- exploring (\_ honk _ -> parallel (pure ()) honk)
@@ -216,3 +258,10 @@ rover = do
 
 saying :: String -> ErrorCall -> Bool
 saying text (ErrorCall why) = text `isInfixOf` why
+
+-- | The exploration has a counterexample, whose exception has this text.
+shouldFailWith :: IO (Either Counterexample Report) -> String -> Expectation
+shouldFailWith exploring text =
+  exploring >>= \case
+    Right report -> expectationFailure ("it holds: " ++ show report)
+    Left found -> show (failingException found) `shouldSatisfy` (text `isInfixOf`)

@@ -32,13 +32,14 @@ import Control.Exception (ErrorCall (..), Exception, mask_, throwIO)
 import Control.Monad (join, unless, void, when)
 import Data.Foldable (for_)
 import Data.IORef
-import Data.Maybe (fromMaybe, isNothing)
+import Data.Maybe (fromMaybe, isJust, isNothing)
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Mock.Claim (Claim, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime
+import Behavior.Internal.Sim.WrongRun
 
 -- $setup
 -- >>> import Behavior
@@ -84,7 +85,7 @@ newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> new
 --
 -- > simulate (begin world >> mission)
 --
--- [Fault] To use it in another run throws an 'ErrorCall', there and where its record is read. (The
+-- [Fault] To use it in another run throws an exception that says so, there and where its record is read. (The
 --   record itself can be read everywhere: 'happened', 'shouldRecord'.)
 --
 -- >>> begin mock
@@ -102,19 +103,22 @@ begin = void . clock
 clock :: Mock -> IO (Seconds, Seconds)
 clock mock = do
   t <- now
+  goesOn <- isRecorded
   here <- simulatedRun
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
   (own, isFirst) <- atomicModifyIORef' (beginning mock) $ \begun ->
-    let it = fromMaybe first begun in (Just it, (it, isNothing begun))
+    -- (What only the unwinding of a run uses is not used.)
+    let it = fromMaybe first begun in (if goesOn then Just it else begun, (it, isNothing begun))
   when isFirst (readIORef (subjects mock) >>= announceActions)
   unless (ownRun own == ownRun first) $ do
-    writeIORef (misuse mock) (Just (belongsTo own first))
-    throwIO (belongsTo own first)
+    let why = belongsTo own first
+    writeIORef (misuse mock) (Just (ErrorCall why))
+    if isJust here then throwIO (WrongRun why) else throwIO (ErrorCall why)
   pure (startTime own, t)
 
 -- | A world that belongs to the first run is used in the second.
-belongsTo :: Beginning -> Beginning -> ErrorCall
-belongsTo own here = ErrorCall $
+belongsTo :: Beginning -> Beginning -> String
+belongsTo own here =
   "a world belongs to the run in which its clock was started; this world's was started "
     ++ case (ownRun own, ownRun here) of
       (Nothing, _) ->
@@ -156,7 +160,10 @@ register mock kind name = do
   announceActions [(name, kind)]
 
 announceActions :: [(String, SubjectKind)] -> IO ()
-announceActions these = announce "" [name | (name, kind) <- these, kind `elem` anyAction]
+announceActions these = announce "" (concatMap actionNames these)
+ where
+  -- The name of one with an argument ends with the blank that comes before the argument.
+  actionNames (name, kind) = [name | kind == AnAction] ++ [name ++ " " | kind == AnActionOn]
 
 -- | Registers how to find the changes of a condition that are due by a given time but not
 -- recorded yet.
@@ -180,16 +187,21 @@ checkTimes mayFollow rule times = for_ (zip (Nothing : map Just times) (take 100
 -- >>> map entryKind . recordEntries <$> happened mock
 -- [Begins,Succeeds]
 --
--- [Fault] Throws the 'ErrorCall' again, if the world was used in a run that it does not belong to (see
---   'begin').
+-- [Fault] Throws an 'ErrorCall', if the world was used in a run that it does not belong to (see
+--   'begin'); in the property of an exploration also if it was used outside of the simulation.
 --
 -- @since 0.1.0.0
 happened :: Mock -> IO Record
 happened mock = do
   readIORef (misuse mock) >>= mapM_ throwIO
+  own <- readIORef (beginning mock)
+  inProperty <- isWithinProperty
+  when (inProperty && maybe False (isNothing . ownRun) own) . throwIO . ErrorCall $
+    "the clock of this world was started outside of the simulation, in the property of an exploration: \
+    \all that uses the world belongs inside (simulate (begin world >> ...))"
   seen <- readIORef (newestEntries mock)
   conditions <- readIORef (pendingChanges mock)
-  came <- readIORef (beginning mock) >>= maybe (pure 0) elapsed
+  came <- maybe (pure 0) elapsed own
   let ended = maximum (came : map entryTime seen)
   due <- atomically (traverse ($ ended) conditions)
   known <- readIORef (subjects mock)

@@ -21,7 +21,7 @@ module Behavior.Internal.Sim.Coverage
 
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (foldl', group, isPrefixOf)
+import Data.List (dropWhileEnd, foldl', group, isPrefixOf, isSuffixOf)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Set (Set)
@@ -111,11 +111,13 @@ started (Coverage known _) = Set.toAscList known
 -- with the names around them.
 neverStarted :: Coverage -> [String]
 neverStarted (Coverage known could) =
-  [ if null operator then name else show (Label operator name) ++ inPath (reverse names)
+  [ if null operator then dropWhileEnd (== ' ') name else show (Label operator name) ++ inPath (reverse names)
   | (names, inside) <- Map.toList could
   , (operator, branches) <- Map.toList inside
   , (name, False) <- Map.toList branches
   , not (null operator && wasStarted name)
   ]
  where
-  wasStarted action = Set.member action known || any ((action ++ " ") `isPrefixOf`) (Set.lookupGT action known)
+  wasStarted action
+    | " " `isSuffixOf` action = any (action `isPrefixOf`) (Set.lookupGT action known)
+    | otherwise = Set.member action known

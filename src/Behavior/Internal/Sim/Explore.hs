@@ -25,6 +25,7 @@ import Behavior.Internal.Sim.Prefix
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
+import Behavior.Internal.Sim.WrongRun
 import Behavior.Internal.Trace.Event (Event)
 
 -- $setup
@@ -73,7 +74,8 @@ reported all' (Tally n total covered) = Report n all' total (started covered) (n
 -- [Failure] Otherwise a 'Counterexample' is thrown, whose schedule was shrunk to few
 --   pre-emptions. 'replaying' runs it again.
 -- [Fault] If a run is not a valid simulation ('BlockedOutside', 'ExternalWakeup', 'TooSlow',
---   'ScheduleMismatch'), an 'ErrorCall' with the text of 'explain' is thrown to the property.
+--   'ScheduleMismatch'), an 'ErrorCall' with the text of 'explain' is thrown to the property; and also if a
+--   mock world was used that belongs to another run. A property that catches it fails all the same.
 --   What would test nothing throws an 'ErrorCall' to the caller: a plan without a schedule, and a
 --   property that returns without a simulation.
 --
@@ -220,10 +222,11 @@ tryExplore plan property = case planSearch plan of
 tryRun :: SimOptions -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
 tryRun o choosing property = do
   made <- newIORef Nothing
+  refusal <- newIORef Nothing
   let simulating act = do
         before <- readIORef made
         case before of
-          Just _ -> throwIO (ErrorCall "explore: a property simulates only once")
+          Just _ -> refuse "explore: a property simulates only once"
           Nothing -> do
             chooser' <- choosing
             (run, startable) <- simulateBy o chooser' act
@@ -237,9 +240,14 @@ tryRun o choosing property = do
               ExternalWakeup _ -> improper run
               TooSlow _ _ -> improper run
               ScheduleMismatch _ -> improper run
+              Faulting e | Just (WrongRun why) <- fromException e -> refuse why
               _ -> pure run
-      improper run = throwIO (ErrorCall (explain (outcome run)))
-  end <- try (property simulating)
+      improper run = refuse (explain (outcome run))
+      -- (Kept as well: the property may catch it.)
+      refuse why = writeIORef refusal (Just (ErrorCall why)) >> throwIO (ErrorCall why)
+  end <- withinProperty . try $ do
+    held <- property simulating >>= evaluate
+    held <$ (readIORef refusal >>= mapM_ throwIO)
   trial <- readIORef made
   case (end, trial) of
     (Right (), Just simulated) -> pure (simulated Nothing)

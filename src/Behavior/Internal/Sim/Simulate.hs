@@ -66,7 +66,7 @@ import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, p
 simulate :: Behavior a -> IO (Run a)
 simulate = simulateWith defaultSimOptions
 
--- | 'simulate' with the given options. (A time there that is negative or NaN is refused with an 'ErrorCall'.)
+-- | 'simulate' with the given options. (A number there that is negative or NaN is refused with an 'ErrorCall'.)
 --
 -- >>> run <- simulateWith defaultSimOptions {scheduled = Seeded 7} (both (sleep 1) (sleep 2))
 -- >>> finished run
@@ -94,6 +94,8 @@ simulateBy o chooser' act = do
   when (isJust nested) . throwIO . ErrorCall $
     "simulate: a simulation inside of a simulation: run the inner behaviour as part of the outer one"
   for_ [("endAt", endAt o), ("timerSlip", timerSlip o), ("realTimeLimit", realTimeLimit o)] (uncurry duration)
+  when (livelockLimit o < 0) . throwIO . ErrorCall $
+    "livelockLimit: a number of scheduling points is zero or more, not " ++ show (livelockLimit o)
   result <- newIORef Nothing
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
   sim <- newSim o chooser'
