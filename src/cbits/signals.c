@@ -42,7 +42,7 @@ static void on_signal(int signal, siginfo_t *info, void *context)
     clock_gettime(CLOCK_MONOTONIC, &t);
     first = __atomic_compare_exchange_n(
         &unanswered_since, &before, t.tv_sec + 1, 0, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);
-    /* (In this order: whoever sets at_rest reads unanswered_since afterwards.) */
+    /* (In this order: the thread that sets at_rest reads unanswered_since afterwards.) */
     if (__atomic_load_n(&at_rest[signal], __ATOMIC_SEQ_CST)) {
         end_by(signal);
     } else if (!first && signal != SIGHUP && t.tv_sec + 1 - before >= 2) {

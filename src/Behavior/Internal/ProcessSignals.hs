@@ -191,7 +191,7 @@ received signal = uninterruptibleMask_ $ do
   current <- process
   t <- getMonotonicTime
   modifyMVar_ current $ \known -> do
-    -- (Whoever has seen the answer, and locks the state then, comes after this handler.)
+    -- (A thread that has seen the answer, and locks the state then, comes after this handler.)
     answer
     there <- catMaybes <$> traverse (deRefWeak . snd) (runs known)
     case there of
