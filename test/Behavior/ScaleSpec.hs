@@ -23,7 +23,7 @@ spec :: Spec
 spec = around_ (within 60 . leavingNothing . onOneCapability) $ do
   describe "A scoped behaviour works in proportion to" children
   it "Traces at the same time cost in proportion to their number" $
-    -- (So many that it does not matter how GHC counts the last 16 MB.)
+    -- (GHC 9.6 does not count the last 16 MB: with fewer traces they would matter.)
     (4000, 8000) `takesAtMost` 2.5 $ \n -> allocatedBy $ do
       end <- newGate
       begun <- newTVarIO 0
