@@ -127,6 +127,7 @@ names = do
     _ <- actionOn mock "on" (\x -> [returning (x :: Int)])
     _ <- sensor mock "s" [returning 'x']
     _ <- driver mock "d" [(0, 'x')]
+    begin mock
     recordSubjects <$> happened mock
       `shouldReturn` ([("c", ACondition), ("p", ACondition), ("a", AnAction), ("on", AnActionOn)]
                         ++ [("s", ASensor), ("d", ADriver)])

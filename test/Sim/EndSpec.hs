@@ -114,7 +114,7 @@ ends = do
         (both (forever (sleep 7) :: Behavior ()) (named "dock" (atomically retry)) :: Behavior ())
     (lines (explain (outcome run)), finished run)
       `shouldBe` ( [ "the virtual time has come to the end that was set"
-                   , "  main waits for its branches: both: left, both: right"
+                   , "  main waits for a transaction (its branches: both: left, both: right)"
                    , "  both: left waits for the end of its sleep"
                    , "  both: right waits for a transaction (dock)"
                    ]

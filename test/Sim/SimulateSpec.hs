@@ -155,7 +155,7 @@ mistakes = do
     run <- simulate (both (atomically retry :: Behavior ()) (sleep (1 / 0)))
     lines (explain (outcome run))
       `shouldBe` [ "deadlock: every thread waits, and nothing in the simulation will wake one"
-                 , "  main waits for its branches: both: left, both: right"
+                 , "  main waits for a transaction (its branches: both: left, both: right)"
                  , "  both: left waits for a transaction"
                  , "  both: right waits for the end of its sleep"
                  ]
@@ -191,6 +191,20 @@ mistakes = do
         defaultSimOptions {livelockLimit = 3000}
         ((sleep 0.5 >> atomically (writeTVar hot True)) `both` once >> forever checkpoint :: Behavior ())
     explain (outcome run) `shouldBe` "livelock: the virtual time does not advance while these threads run: main"
+  it "a livelock beside operators that have reacted at that time, and are idle or have ended" $ do
+    mode <- newTVarIO (0 :: Int)
+    seen <- newTVarIO 0
+    let current = Signal.watching (readTVar mode)
+        sees = atomically . writeTVar seen
+        setTo k = atomically (writeTVar mode k) >> atomically (readTVar seen >>= STM.check . (== k))
+        switching = Signal.switch (Signal.named "mode" current) (\k -> sees k >> sleep 1)
+        leaving = (Signal.whileHolding ((< 20) <$> current) switching ? pure ()) >> sees 20
+    forM_ [(2, switching), (20, leaving)] $ \(n, act) -> do
+      run <-
+        simulateWith
+          defaultSimOptions {livelockLimit = 3000}
+          (act `both` (mapM_ setTo [0 .. n] >> forever checkpoint) :: Behavior ())
+      explain (outcome run) `shouldSatisfy` \text -> "livelock" `isInfixOf` text && not ("reacted" `isInfixOf` text)
   it "a livelock of one thread" $ do
     run <- simulateWith defaultSimOptions {livelockLimit = 3000} (forever checkpoint :: Behavior ())
     explain (outcome run) `shouldContain` "livelock"
@@ -214,7 +228,7 @@ mistakes = do
       parallel (sleep 1) (sleep 2 `finally` throwTo me (userError "e-stop"))
     let text = explain (outcome run)
     text `shouldContain` "parallel: right waited outside of the simulation, for another thread to receive an exception"
-    text `shouldContain` "\n  main waits for its branches: parallel: right"
+    text `shouldContain` "\n  main waits for a transaction (its branches: parallel: right)"
   it "a thread that is woken from outside" $ do
     -- The transaction succeeds in its fifth run, when nothing in the simulation can change its
     -- result. (A thread outside of the simulation might be too early for that, or too late.)

@@ -56,33 +56,38 @@ worlds = do
     (world, drive, _) <- rover
     void (simulate (pure () ? drive))
     for_ [never (startOf "drive"), always (running "drive")] $ \claim ->
-      (world `shouldRecord` claim) `shouldThrow` \(BrokenClaim why) -> "begin it: simulate (begin world" `isInfixOf` why
+      (world `shouldRecord` claim) `shouldThrow` saying "begin it: simulate (begin world"
+    happened world `shouldThrow` saying "begin it: simulate (begin world"
   it "can begin with nothing else, so that such a claim is made" $ do
     (world, drive, _) <- rover
     void (simulate (begin world >> pure () ? drive))
     world `shouldRecord` never (startOf "drive")
   it "fails an exploration that uses one world in all its runs, also if the property catches that" $
-    for_ [id, \property simulating -> property simulating `catchAny` \_ -> pure ()] $ \whole -> do
-      (_, drive, _) <- rover
-      tryExplore (randomly 5) (whole (\simulating -> void (simulating drive)))
-        `shouldFailWith` "started in another simulation"
+    for_ [id, \property simulating -> property simulating `catchAny` \_ -> pure ()] $ \whole ->
+      for_ [id, void . tryAny, both (pure ()) . tryAny] $ \caught -> do
+        (_, drive, _) <- rover
+        tryExplore (randomly 5) (whole (\simulating -> void (simulating (caught drive))))
+          `shouldFailWith` "started in another simulation"
+  it "fails a property of QuickCheck, also if that catches it" $ do
+    (_, drive, _) <- rover
+    tested <- quickCheckWithResult stdArgs {chatty = False} . underSchedules $ \simulating ->
+      True <$ tryAny (simulating drive)
+    output tested `shouldContain` "started in another simulation"
   it "fails an exploration whose property has used it outside of the simulation" $ do
     tryExplore (randomly 5) (\simulating -> do
         (world, _, _) <- rover
         begin world
-        void (simulating (sleep 1))
-        world `shouldRecord` never (startOf "drive"))
+        void (simulating (sleep 1)))
       `shouldFailWith` "started outside of the simulation"
     tryExplore (randomly 5) (\simulating -> do
         world <- newMock
         orders <- driver world "orders" [(1, "tea")]
-        withInbox 9 orders $ \inbox -> void (simulating (onMessage inbox (\_ -> pure (pure ())) (sleep 60)))
-        world `shouldRecord` never (noted "served"))
+        withInbox 9 orders $ \inbox -> void (simulating (onMessage inbox (\_ -> pure (pure ())) (sleep 60))))
       `shouldFailWith` "started outside of the simulation"
   it "is not used by what only the unwinding of a run does with it" $ do
     (world, drive, _) <- rover
     void (simulateWith defaultSimOptions {endAt = 1} (sleep 5 `finally` drive))
-    (world `shouldRecord` never (startOf "drive")) `shouldThrow` \(BrokenClaim why) -> "begin it" `isInfixOf` why
+    (world `shouldRecord` never (startOf "drive")) `shouldThrow` saying "nothing has used this world"
   it "is used again and again in reality" $ do
     world <- newMock
     wave <- action world "wave" [succeeds]
@@ -163,6 +168,12 @@ coverage = do
       _ <- action world "drive" [succeeds]
       home <- action world "drive home" [succeeds]
       void (simulating home)
+    reportNeverStarted report `shouldBe` ["drive"]
+  it "names an action also when a behaviour of that name has been started" $ do
+    report <- explore (randomly 2) $ \simulating -> do
+      world <- newMock
+      _ <- action world "drive" [succeeds]
+      void (simulating (begin world >> named "drive" (pure ())))
     reportNeverStarted report `shouldBe` ["drive"]
   it "knows an action that only some schedules start" $ do
     -- The right branch honks, unless it is stopped before.

@@ -51,7 +51,11 @@ module Behavior.Internal.Runtime
   , reportUncaught
   , isRecorded
   , announce
+  , announceStart
   , simulatedRun
+  , Property
+  , currentProperty
+  , keepMistake
   ) where
 
 import Control.Concurrent
@@ -89,6 +93,7 @@ import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Counter
 import Behavior.Internal.Runtime.Dispatch
 import Behavior.Internal.Runtime.Fork
+import Behavior.Internal.Runtime.Property
 import qualified Behavior.Internal.Runtime.TimerWheel as Timer
 import Behavior.Internal.Seconds
 import Behavior.Internal.Trace.Place (Place (path), inPath, myPlace)
@@ -371,6 +376,14 @@ announce :: String -> [String] -> IO ()
 announce operator branches = inSimulation (pure ()) (\simulation -> recordStartable simulation operator branches)
 {-# INLINE announce #-}
 
+-- | Notes in the simulation that this scripted action has been started.
+announceStart :: String -> IO ()
+announceStart action = inSimulation (pure ()) (\simulation -> recordStarted simulation (Label "" action))
+
 -- | The simulation that the calling thread is part of: its number, and how to read its clock, later too.
 simulatedRun :: IO (Maybe (Int, IO Seconds))
 simulatedRun = inSimulation (pure Nothing) (\simulation -> pure (Just (runNumber simulation, lookAtClock simulation)))
+
+-- | The property of an exploration that the calling thread is part of.
+currentProperty :: IO (Maybe Property)
+currentProperty = inSimulation threadProperty (pure . propertyOf)

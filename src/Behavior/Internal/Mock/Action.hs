@@ -129,6 +129,7 @@ type Calls a = IORef (Map String (Int, [Script a]))
 nextCall :: Mock -> Calls a -> String -> String -> [Script a] -> IO (Script a, Recorder a)
 nextCall mock calls name x scripts = do
   (n, script) <- nextScript calls x scripts
+  announceStart name
   let write t kind = recordEntry mock (RecordEntry t name x n kind)
   pure (script, Recorder {recordKind = write, recordResult = \t _ -> write t Succeeds})
 

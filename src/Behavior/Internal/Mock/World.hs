@@ -27,19 +27,19 @@ module Behavior.Internal.Mock.World
   , BrokenClaim (..)
   ) where
 
+import Control.Applicative ((<|>))
 import Control.Concurrent.STM (STM)
 import Control.Exception (ErrorCall (..), Exception, mask_, throwIO)
 import Control.Monad (join, unless, void, when)
 import Data.Foldable (for_)
 import Data.IORef
-import Data.Maybe (fromMaybe, isJust, isNothing)
+import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Mock.Claim (Claim, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime
-import Behavior.Internal.Sim.WrongRun
 
 -- $setup
 -- >>> import Behavior
@@ -52,6 +52,8 @@ import Behavior.Internal.Sim.WrongRun
 -- @since 0.1.0.0
 data Mock = Mock
   { beginning :: IORef (Maybe Beginning)
+  , madeIn :: Maybe Property
+  -- ^ Of an exploration.
   , misuse :: IORef (Maybe ErrorCall)
   -- ^ The error of a use in another run than its own: that run may have lost it.
   , subjects :: IORef [(String, SubjectKind)]
@@ -75,7 +77,7 @@ data Beginning = Beginning
 --
 -- @since 0.1.0.0
 newMock :: IO Mock
-newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
+newMock = Mock <$> newIORef Nothing <*> currentProperty <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
 
 -- | Starts the clock of the world, if it is not running yet. Without this it starts when the first
 -- action begins, or when a condition is read, watched or set for the first time.
@@ -85,8 +87,9 @@ newMock = Mock <$> newIORef Nothing <*> newIORef Nothing <*> newIORef [] <*> new
 --
 -- > simulate (begin world >> mission)
 --
--- [Fault] To use it in another run throws an exception that says so, there and where its record is read. (The
---   record itself can be read everywhere: 'happened', 'shouldRecord'.)
+-- [Fault] To use it in another run throws an 'ErrorCall', there and where its record is read; in an exploration
+--   also to use it outside of the simulation. (The record itself can be read everywhere: 'happened',
+--   'shouldRecord'.)
 --
 -- >>> begin mock
 -- >>> run <- simulate (begin mock)
@@ -103,18 +106,31 @@ begin = void . clock
 clock :: Mock -> IO (Seconds, Seconds)
 clock mock = do
   t <- now
-  goesOn <- isRecorded
   here <- simulatedRun
+  goesOn <- isRecorded
+  property <- (<|> madeIn mock) <$> currentProperty
+  -- Neither starts the clock: what is unwound after the end of a run, and what is outside of the simulation
+  -- that a property runs.
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
-  (own, isFirst) <- atomicModifyIORef' (beginning mock) $ \begun ->
-    -- (What only the unwinding of a run uses is not used.)
-    let it = fromMaybe first begun in (if goesOn then Just it else begun, (it, isNothing begun))
-  when isFirst (readIORef (subjects mock) >>= announceActions)
-  unless (ownRun own == ownRun first) $ do
-    let why = belongsTo own first
-    writeIORef (misuse mock) (Just (ErrorCall why))
-    if isJust here then throwIO (WrongRun why) else throwIO (ErrorCall why)
-  pure (startTime own, t)
+      begins = goesOn && (isJust here || isNothing property)
+      refuse why = do
+        writeIORef (misuse mock) (Just (ErrorCall why))
+        mapM_ (`keepMistake` ErrorCall why) property
+        throwIO (ErrorCall why)
+  begun <- atomicModifyIORef' (beginning mock) $ \old -> (old <|> (if begins then Just first else Nothing), old)
+  case begun of
+    Nothing
+      | begins -> readIORef (subjects mock) >>= announceActions
+      | goesOn -> refuse outsideOfSimulation
+    Just own | ownRun own /= ownRun first -> refuse (belongsTo own first)
+    _ -> pure ()
+  pure (maybe t startTime begun, t)
+
+-- | A property of an exploration uses a world outside of its simulation.
+outsideOfSimulation :: String
+outsideOfSimulation =
+  "a world belongs to a run, and this world's clock would be started outside of the simulation that a property is to \
+  \run: begin it inside, and use it there only (simulated (begin world >> ...), withInbox with its drivers too)"
 
 -- | A world that belongs to the first run is used in the second.
 belongsTo :: Beginning -> Beginning -> String
@@ -160,10 +176,7 @@ register mock kind name = do
   announceActions [(name, kind)]
 
 announceActions :: [(String, SubjectKind)] -> IO ()
-announceActions these = announce "" (concatMap actionNames these)
- where
-  -- The name of one with an argument ends with the blank that comes before the argument.
-  actionNames (name, kind) = [name | kind == AnAction] ++ [name ++ " " | kind == AnActionOn]
+announceActions these = announce "" [name | (name, kind) <- these, kind `elem` anyAction]
 
 -- | Registers how to find the changes of a condition that are due by a given time but not
 -- recorded yet.
@@ -187,21 +200,20 @@ checkTimes mayFollow rule times = for_ (zip (Nothing : map Just times) (take 100
 -- >>> map entryKind . recordEntries <$> happened mock
 -- [Begins,Succeeds]
 --
--- [Fault] Throws an 'ErrorCall', if the world was used in a run that it does not belong to (see
---   'begin'); in the property of an exploration also if it was used outside of the simulation.
+-- [Fault] Throws the 'ErrorCall' again, if the world was used in a run that it does not belong to (see
+--   'begin'); and one, if nothing has used the world: then there is no record, and not an empty one.
 --
 -- @since 0.1.0.0
 happened :: Mock -> IO Record
 happened mock = do
   readIORef (misuse mock) >>= mapM_ throwIO
-  own <- readIORef (beginning mock)
-  inProperty <- isWithinProperty
-  when (inProperty && maybe False (isNothing . ownRun) own) . throwIO . ErrorCall $
-    "the clock of this world was started outside of the simulation, in the property of an exploration: \
-    \all that uses the world belongs inside (simulate (begin world >> ...))"
+  begun <- readIORef (beginning mock)
+  when (isNothing begun) . throwIO . ErrorCall $
+    "nothing has used this world, so there is no record to judge; if that is right, begin it: \
+    \simulate (begin world >> ...)"
   seen <- readIORef (newestEntries mock)
   conditions <- readIORef (pendingChanges mock)
-  came <- maybe (pure 0) elapsed own
+  came <- maybe (pure 0) elapsed begun
   let ended = maximum (came : map entryTime seen)
   due <- atomically (traverse ($ ended) conditions)
   known <- readIORef (subjects mock)
@@ -220,10 +232,6 @@ happened mock = do
 shouldRecord :: Mock -> Claim -> IO ()
 shouldRecord mock claim = do
   record <- happened mock
-  begun <- readIORef (beginning mock)
-  when (isNothing begun) . throwIO . BrokenClaim $
-    "Nothing has used this world, so there is no record to hold. If that is right, begin it: \
-    \simulate (begin world >> ...)"
   either (throwIO . BrokenClaim) pure (verdict claim record)
 
 infix 1 `shouldRecord`

@@ -14,6 +14,7 @@ import Control.Concurrent (ThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception (SomeException)
 
+import Behavior.Internal.Runtime.Property (Property)
 import Behavior.Internal.Seconds (Seconds)
 
 -- | The operator that started a thread, and what runs in it: @Label "monitor" "task"@.
@@ -31,6 +32,8 @@ instance Show Label where
 data Simulator = Simulator
   { runNumber :: Int
   -- ^ Which simulation it is.
+  , propertyOf :: Maybe Property
+  -- ^ The property that runs it, if one does.
   , isRunning :: ThreadId -> IO Bool
   -- ^ Whether this is the one thread of the simulation that runs at the moment.
   , spawn :: forall a. Label -> (IO () -> (forall b. IO b -> IO b) -> IO a) -> (a -> STM ()) -> IO ThreadId
@@ -58,4 +61,6 @@ data Simulator = Simulator
   , recordStartable :: String -> [String] -> IO ()
   -- ^ Adds what an operator with this name, which begins here, can start. (@""@: the scripted actions of a
   -- world.)
+  , recordStarted :: Label -> IO ()
+  -- ^ Notes that this branch, or scripted action, has been started.
   }

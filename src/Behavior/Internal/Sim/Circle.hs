@@ -9,6 +9,7 @@ module Behavior.Internal.Sim.Circle
   ( circles
   ) where
 
+import qualified Data.IntSet as IntSet
 import Data.List (intercalate, nub)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (mapMaybe)
@@ -17,11 +18,18 @@ import Behavior.Internal.SafeText
 import Behavior.Internal.Seconds (Seconds)
 import Behavior.Internal.Trace.Event
 
--- | For each operator that has reacted more than once at this time: how often, the values to which it
--- reacted, and what it started. The events are given latest first.
-circles :: Seconds -> [Event] -> [String]
-circles now' latestFirst = [described rs | rs@(_ : _ : _) <- Map.elems reactions]
+-- | For each operator that has reacted again and again at this time, and goes on: how often, the values to which it
+-- reacted, and what it started. The events are given latest first. (One that reacts less than once in a thousand of
+-- the scheduling points that the limit allows is not what uses them up.)
+circles :: Int -> Seconds -> [Event] -> [String]
+circles limit now' latestFirst =
+  [ described rs
+  | ((Inside operator, _), rs@(_ : _ : _)) <- Map.toList reactions
+  , 1000 * length rs >= limit
+  , not (IntSet.member operator ended)
+  ]
  where
+  ended = IntSet.fromList [spanNumber s | Ended s _ _ <- recent]
   reactions = Map.fromListWith (++) [((reactionParent r, reactionOperator r), [r]) | Reacted r <- recent]
   recent = takeWhile happensNow latestFirst
   happensNow = \case

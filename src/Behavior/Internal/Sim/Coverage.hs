@@ -21,7 +21,7 @@ module Behavior.Internal.Sim.Coverage
 
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
-import Data.List (dropWhileEnd, foldl', group, isPrefixOf, isSuffixOf)
+import Data.List (foldl', group)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Set (Set)
@@ -51,7 +51,7 @@ canStart operator branches here reached
   | all (`Map.member` before) branches = reached
   | otherwise = IntMap.insert number (Inner names (Map.insert operator (Map.union before new) inside)) reached
  where
-  (number, names) = if null operator then (0, []) else innermost here
+  (number, names) = placeOf operator here
   inside = operatorsIn number reached
   before = Map.findWithDefault Map.empty operator inside
   new = Map.fromList (map (\branch -> (branch, False)) branches)
@@ -64,16 +64,20 @@ starts (Label operator branch) here reached = case Map.lookup operator inside of
         IntMap.insert number (Inner names (Map.insert operator (Map.insert branch True branches) inside)) reached
   _ -> reached
  where
-  (number, names) = innermost here
+  (number, names) = placeOf operator here
   inside = operatorsIn number reached
 
 operatorsIn :: Int -> Reached -> Operators
 operatorsIn number = maybe Map.empty (\(Inner _ inside) -> inside) . IntMap.lookup number
 
--- | The innermost span with a name around a place: its number, and the names.
-innermost :: Maybe Place -> (Int, [String])
-innermost here = case here of
-  Just Place {around = spans, path = names} | n : _ <- [n | InSpan Named n <- spans] -> (n, names)
+-- | Where this operator is: the number of the innermost span with a name, and the names. (Scripted actions are in
+-- no span.)
+placeOf :: String -> Maybe Place -> (Int, [String])
+placeOf operator here = case here of
+  Just Place {around = spans, path = names}
+    | n : _ <- [n | InSpan Named n <- spans]
+    , not (null operator) ->
+        (n, names)
   _ -> (0, [])
 
 -- | The names of what was started; and of what can be, whether it was, by the names around it, the outermost
@@ -110,14 +114,9 @@ started (Coverage known _) = Set.toAscList known
 -- | The names of what no run has started: scripted actions, with no argument if they have one; and branches,
 -- with the names around them.
 neverStarted :: Coverage -> [String]
-neverStarted (Coverage known could) =
-  [ if null operator then dropWhileEnd (== ' ') name else show (Label operator name) ++ inPath (reverse names)
+neverStarted (Coverage _ could) =
+  [ show (if null operator then Label name "" else Label operator name) ++ inPath (reverse names)
   | (names, inside) <- Map.toList could
   , (operator, branches) <- Map.toList inside
   , (name, False) <- Map.toList branches
-  , not (null operator && wasStarted name)
   ]
- where
-  wasStarted action
-    | " " `isSuffixOf` action = any (action `isPrefixOf`) (Set.lookupGT action known)
-    | otherwise = Set.member action known

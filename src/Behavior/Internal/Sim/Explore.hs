@@ -18,6 +18,7 @@ import Data.Maybe (fromMaybe)
 import qualified Data.Sequence as Seq
 
 import Behavior.Internal.Failure (Behavior, isCancellation)
+import Behavior.Internal.Runtime.Property
 import Behavior.Internal.Sim.Coverage
 import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Policy
@@ -25,7 +26,6 @@ import Behavior.Internal.Sim.Prefix
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Sim.WrongRun
 import Behavior.Internal.Trace.Event (Event)
 
 -- $setup
@@ -220,16 +220,15 @@ tryExplore plan property = case planSearch plan of
 
 -- | Runs the property once.
 tryRun :: SimOptions -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
-tryRun o choosing property = do
+tryRun o choosing property = testing $ \this -> do
   made <- newIORef Nothing
-  refusal <- newIORef Nothing
   let simulating act = do
         before <- readIORef made
         case before of
-          Just _ -> refuse "explore: a property simulates only once"
+          Just _ -> mistake "explore: a property simulates only once"
           Nothing -> do
             chooser' <- choosing
-            (run, startable) <- simulateBy o chooser' act
+            (run, startable) <- simulateBy o (Just this) chooser' act
             let deviating = case runSchedule run of
                   Preempting s -> s
                   _ -> []
@@ -240,14 +239,11 @@ tryRun o choosing property = do
               ExternalWakeup _ -> improper run
               TooSlow _ _ -> improper run
               ScheduleMismatch _ -> improper run
-              Faulting e | Just (WrongRun why) <- fromException e -> refuse why
-              _ -> pure run
-      improper run = refuse (explain (outcome run))
-      -- (Kept as well: the property may catch it.)
-      refuse why = writeIORef refusal (Just (ErrorCall why)) >> throwIO (ErrorCall why)
-  end <- withinProperty . try $ do
-    held <- property simulating >>= evaluate
-    held <$ (readIORef refusal >>= mapM_ throwIO)
+              _ -> run <$ throwMistake
+      improper run = mistake (explain (outcome run))
+      mistake why = keepMistake this (ErrorCall why) >> throwIO (ErrorCall why)
+      throwMistake = mistakeOf this >>= mapM_ throwIO
+  end <- try ((property simulating >>= evaluate) <* throwMistake)
   trial <- readIORef made
   case (end, trial) of
     (Right (), Just simulated) -> pure (simulated Nothing)

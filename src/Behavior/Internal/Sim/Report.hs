@@ -34,7 +34,7 @@ import Behavior.Internal.Sim.Types
 -- >>> run <- simulate (both (sleep 1) (atomically retry))
 -- >>> putStrLn (explain (outcome run))
 -- deadlock: every thread waits, and nothing in the simulation will wake one
---   main waits for its branches: both: right
+--   main waits for a transaction (its branches: both: right)
 --   both: right waits for a transaction
 --
 -- @since 0.1.0.0

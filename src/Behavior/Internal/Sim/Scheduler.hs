@@ -32,6 +32,7 @@ import Data.Maybe (isJust)
 import Foreign.StablePtr (newStablePtr)
 
 import Behavior.Internal.Runtime.Backend
+import Behavior.Internal.Runtime.Property (Property)
 import Behavior.Internal.SafeText
 import Behavior.Internal.Sim.Coverage (canStart, starts)
 import Behavior.Internal.Sim.Enabled
@@ -41,11 +42,12 @@ import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Trace.Place (myPlace)
 
--- | The backend that the seam calls, for the simulation with this number.
-simulation :: Int -> Sim -> Simulator
-simulation n sim =
+-- | The backend that the seam calls, for the simulation with this number, run by this property.
+simulation :: Int -> Maybe Property -> Sim -> Simulator
+simulation n property sim =
   Simulator
     { runNumber = n
+    , propertyOf = property
     , isRunning = \self -> (== Just self) . taskThread <$> readIORef (current sim)
     , spawn = \name body publish -> do
         operation sim AlwaysEnabled
@@ -70,6 +72,7 @@ simulation n sim =
     , recordStart = settle sim >> recordStep sim Starts
     , recordNote = \text -> settle sim >> recordStep sim (Note text)
     , recordStartable = \operator branches -> reaching (canStart operator branches)
+    , recordStarted = reaching . starts
     }
  where
   -- An exception for a thread that has ended is dropped.

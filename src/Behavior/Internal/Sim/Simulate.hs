@@ -24,6 +24,7 @@ import System.IO.Unsafe (unsafePerformIO)
 import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Dispatch
+import Behavior.Internal.Runtime.Property (Property)
 import Behavior.Internal.SafeText (settledText)
 import Behavior.Internal.Seconds (duration)
 import Behavior.Internal.Sim.Coverage (Reached)
@@ -85,11 +86,12 @@ simulate = simulateWith defaultSimOptions
 simulateWith :: SimOptions -> Behavior a -> IO (Run a)
 simulateWith o act = do
   chooser' <- policy (scheduled o)
-  fst <$> simulateBy o chooser' act
+  fst <$> simulateBy o Nothing chooser' act
 
--- | 'simulateWith' under the given policy. It also gives what the run could start, and has.
-simulateBy :: SimOptions -> Policy -> Behavior a -> IO (Run a, Reached)
-simulateBy o chooser' act = do
+-- | 'simulateWith' under the given policy, for the property that runs it. It also gives what the run could start,
+-- and has.
+simulateBy :: SimOptions -> Maybe Property -> Policy -> Behavior a -> IO (Run a, Reached)
+simulateBy o property chooser' act = do
   nested <- simulator
   when (isJust nested) . throwIO . ErrorCall $
     "simulate: a simulation inside of a simulation: run the inner behaviour as part of the outer one"
@@ -100,7 +102,7 @@ simulateBy o chooser' act = do
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
   sim <- newSim o chooser'
   root <- placeIn [] <$> traceOf sim
-  mask $ \restore -> withBackend n (simulation n sim) . watched n sim $ do
+  mask $ \restore -> withBackend n (simulation n property sim) . watched n sim $ do
     let run unmasked = try (inPlace (Just root) unmasked) >>= writeIORef result . Just
     (main, _) <- launch sim (-1) (Label "main" "") (\begin unmask -> run (unmask (begin >> act))) (const (pure ()))
     writeIORef (current sim) main

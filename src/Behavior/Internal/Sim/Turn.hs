@@ -41,7 +41,7 @@ choose sim me = do
   case Map.lookupMin enabledTasks of
     Nothing -> advanceTime sim >>= \advanced -> if advanced then choose sim me else pure Nothing
     _ | n - moved > livelockLimit (options sim) -> do
-      repeated <- circles <$> readIORef (time sim) <*> readIORef (emitted sim)
+      repeated <- circles (livelockLimit (options sim)) <$> readIORef (time sim) <*> readIORef (emitted sim)
       endWith (Livelock (map taskLabel (Map.elems enabledTasks)) repeated)
     Just (first, only)
       | Map.size enabledTasks == 1 -> run n rotating only
@@ -167,7 +167,7 @@ waitingTasks sim these = do
     Before _ (Transaction _ _) ->
       case [show (taskLabel t) | t <- alive, parent t == taskNumber task, isJust (taskThread t)] of
         [] -> "a transaction"
-        branches -> "its branches: " ++ commas branches
+        branches -> "a transaction (its branches: " ++ commas branches ++ ")"
     Before _ (Moment _) -> "the end of its sleep"
     Before _ (Delivery target _) -> toReceive target
     _ -> "its turn"

@@ -27,7 +27,7 @@ module Behavior.Sim.QuickCheck
   ) where
 
 import Control.Exception (Exception (..), SomeAsyncException, throwIO)
-import Control.Monad (when)
+import Control.Monad (unless, when)
 import Data.Foldable (for_)
 import Data.IORef
 import Data.Maybe (isJust, isNothing)
@@ -40,6 +40,7 @@ import Test.QuickCheck.Property
   , Property (..)
   , Result (..)
   , Rose (..)
+  , exception
   , ioRose
   , reduceRose
   , rejected
@@ -131,11 +132,15 @@ underSchedule body drawn = ioRose $ do
       -- A case that is discarded need not simulate.
       discarded <- (isNothing (ok result) &&) <$> readIORef idle
       when (falsified result || discarded) (throwIO Falsified)
+    -- What the property was not to catch.
+    for_ (either (Just . failingException) (const Nothing) found) $ \e ->
+      unless (isFalsified e) (writeIORef latest (MkRose (exception "Exception" e) []))
     writeIORef over (Just (either failingSchedule (const drawn) found))
     writeIORef shown (either Just (const Nothing) found)
     readIORef latest >>= explained shown
   isMismatch (ScheduleMismatch _) = True
   isMismatch _ = False
+  isFalsified e = isJust (fromException e :: Maybe Falsified)
   isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 
 -- | Adds to each failure the schedule and the steps of its run.

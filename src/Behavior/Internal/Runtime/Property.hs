@@ -1,0 +1,57 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
+-- |
+-- The properties that are being tested, each in a thread; and the mistakes that make such a test void.
+--
+-- A mistake is thrown where it is made, but a behaviour or the property itself may catch that. So it is
+-- also kept, and thrown again when the property has ended.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Internal.Runtime.Property
+  ( Property
+  , testing
+  , keepMistake
+  , mistakeOf
+  , threadProperty
+  ) where
+
+import Control.Concurrent (myThreadId)
+import Control.Exception (Exception (toException), SomeException, bracket_)
+import Control.Monad (mplus)
+import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
+import System.IO.Unsafe (unsafePerformIO)
+
+import Behavior.Internal.Runtime.ThreadNumber
+
+-- | One test of a property: the first mistake that was made in it.
+newtype Property = Property (IORef (Maybe SomeException))
+
+-- | The properties by the numbers of their threads. (A thread that is kept here could not be found to be
+-- blocked for ever.)
+properties :: IORef (IntMap Property)
+properties = unsafePerformIO (newIORef IntMap.empty)
+{-# NOINLINE properties #-}
+
+-- | Runs a test of a property in the calling thread.
+testing :: (Property -> IO a) -> IO a
+testing test = do
+  me <- threadNumber <$> myThreadId
+  around <- IntMap.lookup me <$> readIORef properties
+  property <- Property <$> newIORef Nothing
+  bracket_ (change (IntMap.insert me property)) (change (IntMap.alter (const around) me)) (test property)
+ where
+  change f = atomicModifyIORef' properties (\these -> (f these, ()))
+
+-- | Keeps the mistake, if it is the first.
+keepMistake :: Exception e => Property -> e -> IO ()
+keepMistake (Property mistake) e = atomicModifyIORef' mistake (\old -> (old `mplus` Just (toException e), ()))
+
+-- | The first mistake that was made in it.
+mistakeOf :: Property -> IO (Maybe SomeException)
+mistakeOf (Property mistake) = readIORef mistake
+
+-- | The property that the calling thread runs, outside of its simulation.
+threadProperty :: IO (Maybe Property)
+threadProperty = IntMap.lookup . threadNumber <$> myThreadId <*> readIORef properties
