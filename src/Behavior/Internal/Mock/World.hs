@@ -77,7 +77,8 @@ data Beginning = Beginning
 --
 -- @since 0.1.0.0
 newMock :: IO Mock
-newMock = Mock <$> newIORef Nothing <*> currentProperty <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
+newMock =
+  Mock <$> newIORef Nothing <*> currentProperty <*> newIORef Nothing <*> newIORef [] <*> newIORef [] <*> newIORef []
 
 -- | Starts the clock of the world, if it is not running yet. Without this it starts when the first
 -- action begins, or when a condition is read, watched or set for the first time.
