@@ -42,11 +42,12 @@ outranked messages robots = do
         fleeing <- newTVarIO False
         rule <- messageRule inbox (\m -> add begun >> replicateM_ 3 yield >> pure (commit m))
         let flee = forever (atomically (readTVar fleeing >>= check . not >> writeTVar fleeing True))
-            alarms = forever $ do
+            -- (With two capabilities nine yields can be too short for a handler to begin, again and again.)
+            alarms = forever . for_ (1000 : replicate 300 9) $ \pauses -> do
               add dangers
               atomically (writeTVar danger True)
               atomically (readTVar fleeing >>= check >> writeTVar fleeing False >> writeTVar danger False)
-              replicateM_ 9 yield
+              replicateM_ pauses yield
         alarms ||| Signal.teleoReactive [(Signal.watching (readTVar danger), flee), rule, (pure True, atomically retry)]
   withInbox messages (\deliver -> pure () <$ for_ [1 .. messages] deliver) $ \inbox ->
     foldr both (pure ()) (replicate robots (robot inbox)) ||| atomically (unhandled inbox >>= check . (== 0))
