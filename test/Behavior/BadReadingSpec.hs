@@ -14,11 +14,11 @@ import Data.Maybe (isJust)
 import Test.Hspec
 
 import Behavior (Failed)
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Runtime (atomically, now)
 import Behavior.Internal.Scope (Verdict (..), SomeBranch (..), requestStopAsync, outcome, structured)
 import Behavior.Internal.Signal.Source (startSensors)
 import qualified Behavior.Internal.Signal.Source as Source
-import Behavior.Internal.Trace.Event (Cause (..))
 import qualified Behavior.Signal as Signal
 import Support
 import Watched

@@ -18,9 +18,9 @@ import GHC.Conc.Sync (threadLabel)
 import Test.Hspec hiding (parallel)
 
 import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
-import Behavior.Internal.Trace.Event (Cause (..))
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly)
 import Support

@@ -16,12 +16,12 @@ import Control.Exception (Exception (..), SomeException, catch, mask, throwIO, t
 import Control.Monad (join, void, when)
 import System.IO.Unsafe (unsafePerformIO)
 
+import Behavior.Internal.Cause (Cause)
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime
 import Behavior.Internal.Scope
 import Behavior.Internal.Seconds (duration)
 import Behavior.Internal.Stop (causeOf)
-import Behavior.Internal.Trace.Event (Cause)
 import Behavior.Internal.Trace.Place (inPlace)
 import Behavior.Internal.Trace.Span (abandonableIn)
 

@@ -26,11 +26,11 @@ import Control.Monad (foldM, unless, (>=>))
 import Control.Monad.Catch (MonadThrow)
 import Data.Foldable (asum, traverse_)
 
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Failure
 import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (atomically)
 import Behavior.Internal.Scope hiding (requestStop)
-import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior

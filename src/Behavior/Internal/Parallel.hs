@@ -30,11 +30,11 @@ import Data.List (intercalate)
 import Data.Maybe (isNothing)
 import Data.Traversable (mapAccumL)
 
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Failure (Behavior, BehaviorFailed, failWith, failed)
 import Behavior.Internal.Leftmost
 import Behavior.Internal.Runtime (atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
-import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior

@@ -12,11 +12,11 @@ import Control.Concurrent.STM (orElse)
 import Control.Exception (throwIO)
 import System.Exit (ExitCode (..))
 
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.ProcessSignals (withSignals)
 import Behavior.Internal.Runtime (atomically)
 import Behavior.Internal.Scope
-import Behavior.Internal.Trace.Event (Cause (..))
 
 -- | Runs a behaviour as a whole program; to be called by @main@.
 --

@@ -48,17 +48,15 @@ module Behavior.Internal.Scope
   , result
   ) where
 
-import Control.Concurrent (ThreadId, myThreadId)
+import Control.Concurrent (ThreadId)
 import Control.Concurrent.STM (STM)
 import Control.Exception
   ( BlockedIndefinitelyOnMVar (..)
   , BlockedIndefinitelyOnSTM (..)
   , Exception (..)
   , MaskingState (..)
-  , SomeAsyncException (..)
-  , SomeException (..)
+  , SomeException
   , catch
-  , evaluate
   , getMaskingState
   , mask
   , mask_
@@ -69,10 +67,11 @@ import Control.Monad (foldM, when)
 import Data.IORef (IORef, modifyIORef', newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 
-import Behavior.Internal.Failure (BehaviorFailed (..), StoppedWithFault (..), isFailure)
+import Behavior.Internal.Cause (Cause (..))
+import Behavior.Internal.Failure (StoppedWithFault (..))
+import Behavior.Internal.Outcome (Outcome (..), classify, defined, outcomeToIO, result)
 import Behavior.Internal.Runtime
-import Behavior.Internal.Stop (Stop (..), causeOf, isStopOf)
-import Behavior.Internal.Trace.Event (Cause (..))
+import Behavior.Internal.Stop (Stop (..), causeOf)
 import Behavior.Internal.Trace.Span (operatorSpan)
 
 -- | What an operator has started.
@@ -105,17 +104,6 @@ branchId = threadId . branchThread
 
 -- | A branch, whatever it returns.
 data SomeBranch = forall a. SomeBranch (Branch a)
-
--- | How a branch ended.
-data Outcome a
-  = -- | It returned, perhaps although its stop was requested.
-    Completed a
-  | -- | It failed.
-    Failing SomeException
-  | -- | It threw anything else, perhaps while it was being stopped.
-    Faulted SomeException
-  | -- | Its stop was requested, and it stopped.
-    Stopped SomeException
 
 -- | What an operator has decided: an action that returns or throws; and why the branches that still
 -- run are stopped.
@@ -296,44 +284,3 @@ tryReadOutcome = tryReadEnd . branchThread
 -- | What the branch returned, if it has. Does not block.
 completedNow :: Branch a -> IO (Maybe a)
 completedNow b = (>>= either (const Nothing) Just . result) <$> tryReadOutcome b
-
--- | The action that returns or throws as the branch did.
-outcomeToIO :: Outcome a -> IO a
-outcomeToIO = either throwIO pure . result
-
--- | What a branch returned, or what it threw.
-result :: Outcome a -> Either SomeException a
-result = \case
-  Completed a -> Right a
-  Failing e -> Left e
-  Faulted e -> Left e
-  Stopped e -> Left e
-
--- | The outcome of a branch whose action ended like this. It is evaluated in the branch's own
--- thread: an exception may itself be undefined, so that evaluating it throws, which must not
--- happen in an operator that still has branches. What that evaluation throws is the fault.
-classify :: Either SomeException a -> IO (Outcome a)
-classify = \case
-  Right a -> pure (Completed a)
-  Left e -> do
-    self <- myThreadId
-    try (evaluate (kind self e)) >>= either (fmap Faulted . defined) pure
- where
-  kind self e
-    | isStopOf self e = Stopped e
-    | otherwise = kindOfOther self (forced e)
-  kindOfOther self e
-    | Just (StoppedWithFault cause fault) <- fromException e, isStopOf self cause = Faulted $! forced fault
-    | isFailure e = Failing e
-    | otherwise = Faulted e
-
--- | The exception; or if it is itself undefined, what it throws.
-defined :: SomeException -> IO SomeException
-defined e = try (evaluate (forced e)) >>= either defined pure
-
--- | The exception; evaluating it also evaluates everything that handlers match on.
-forced :: SomeException -> SomeException
-forced e@(SomeException inner)
-  | Just (BehaviorFailed _ failure) <- fromException e = failure `seq` e
-  | Just (SomeAsyncException cancellation) <- fromException e = cancellation `seq` e
-  | otherwise = inner `seq` e

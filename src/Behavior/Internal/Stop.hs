@@ -2,14 +2,14 @@
 
 -- |
 -- How an operator requests the stop of a branch, and what the exception that ends a behaviour says
--- about why it ended.
+-- about why it was stopped.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Stop
   ( Stop (..)
   , isStopOf
   , causeOf
-  , endOf
+  , displayed
   , atPath
   ) where
 
@@ -19,13 +19,11 @@ import Control.Exception
   , SomeException (..)
   , asyncExceptionFromException
   , asyncExceptionToException
-  , evaluate
-  , try
   )
 
-import Behavior.Internal.Failure (BehaviorFailed (..), StoppedWithFault (..), isCancellation)
+import Behavior.Internal.Cause (Cause (..))
+import Behavior.Internal.Failure (BehaviorFailed (..), StoppedWithFault (..))
 import Behavior.Internal.SafeText (settledText)
-import Behavior.Internal.Trace.Event (Cause (..), End (..))
 
 -- | The exception by which an operator requests the stop of a branch, and why it does. It names
 -- the branch's thread: a request that reaches another thread is not taken for that thread's own.
@@ -51,17 +49,7 @@ causeOf e
   | Just (StoppedWithFault cause _) <- fromException e = causeOf cause
   | otherwise = FromOutside (displayed e)
 
--- | How a behaviour ended that returned or threw.
-endOf :: Either SomeException a -> IO End
-endOf = either (\e -> try (evaluate (kind e)) >>= either undefinedException pure) (\_ -> pure Succeeded)
- where
-  kind e
-    | Just (BehaviorFailed _ failure) <- fromException e = FailedWith (displayException failure)
-    | Just (StoppedWithFault _ fault) <- fromException e = FaultedWith (displayed fault)
-    | isCancellation e = StoppedBy $! causeOf e
-    | otherwise = FaultedWith (displayed e)
-  undefinedException e = pure (FaultedWith (displayed e))
-
+-- | The text of an exception that a trace shows.
 displayed :: SomeException -> String
 displayed (SomeException e) = displayException e
 

@@ -16,11 +16,11 @@ module Behavior.Internal.Reactive.Engine
 import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
 
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime (announce, atomically, tryReadThenBlock)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
-import Behavior.Internal.Trace.Event (Cause (..))
 import Behavior.Internal.Trace.Observer
 
 -- | What an operator does for a value of the signal.

@@ -14,6 +14,7 @@ import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
 import Control.Exception (mask_, throwIO, try)
 import Control.Monad (unless)
 
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine
 import Behavior.Internal.Repeating (sleepForever)
@@ -21,7 +22,6 @@ import Behavior.Internal.Runtime (awaitUninterruptibly)
 import Behavior.Internal.Scope
 import Behavior.Internal.Signal.Source
 import Behavior.Internal.Stop (causeOf)
-import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior

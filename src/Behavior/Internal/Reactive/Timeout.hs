@@ -15,6 +15,7 @@ module Behavior.Internal.Reactive.Timeout
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception (Exception (..), throwIO, uninterruptibleMask_)
 
+import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Failure
   ( Behavior
   , behaviorFailedFromException
@@ -24,7 +25,6 @@ import Behavior.Internal.Reactive.Engine (Response (..), react)
 import Behavior.Internal.Runtime (atomically, now, sleepUntil)
 import Behavior.Internal.Seconds (Seconds, duration, moment)
 import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), constantView, fromView)
-import Behavior.Internal.Trace.Event (Cause (..))
 
 -- $setup
 -- >>> import Behavior (sleep, (?))

@@ -25,6 +25,7 @@ module Behavior.Internal.Trace.Event
   , traverseTexts
   ) where
 
+import Behavior.Internal.Cause (Cause (..), Change (..))
 import Behavior.Internal.Seconds (Seconds)
 
 -- | An event of a trace. Times are those of 'Behavior.Time.now'.
@@ -93,24 +94,6 @@ data End
     StoppedBy Cause
   deriving (Eq, Ord, Show, Read)
 
--- | Why a span was stopped.
---
--- @since 0.1.0.0
-data Cause
-  = -- | A signal changed: the number of the reaction, and the values.
-    SignalChanged !Int [Change]
-  | -- | This branch of the same operator finished.
-    SiblingFinished String
-  | -- | This branch of the same operator failed or faulted, or a sensor with this name did.
-    SiblingFailed String
-  | -- | A time limit of that many seconds.
-    TimeLimit !Seconds
-  | -- | Cancelled from outside: the text of the exception.
-    FromOutside String
-  | -- | It was abandoned ('Behavior.Time.abandoning'), and may still run.
-    WasAbandoned
-  deriving (Eq, Ord, Show, Read)
-
 -- | What an operator did when its signal changed.
 --
 -- @since 0.1.0.0
@@ -143,17 +126,6 @@ data StoppedBranch = StoppedBranch
   -- ^ How long it took until it had ended, cleanup included.
   , stoppedEnd :: !End
   -- ^ How it ended: 'Succeeded' if it completed nevertheless.
-  }
-  deriving (Eq, Ord, Show, Read)
-
--- | A value of a signal that has a name, before and after a change.
---
--- @since 0.1.0.0
-data Change = Change
-  { changeSignal :: String
-  , changeBefore :: !(Maybe String)
-  -- ^ The value when the operator last reacted, if it has before.
-  , changeAfter :: String
   }
   deriving (Eq, Ord, Show, Read)
 

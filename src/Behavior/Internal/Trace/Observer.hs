@@ -33,10 +33,9 @@ import Data.Maybe (fromMaybe, isNothing)
 
 import Behavior.Internal.SafeText (settledText)
 import Behavior.Internal.Seconds (Seconds)
-import Behavior.Internal.Stop (endOf)
 import Behavior.Internal.Trace.Event
 import Behavior.Internal.Trace.Place
-import Behavior.Internal.Trace.Span (newNumber, parentFor, reportEach)
+import Behavior.Internal.Trace.Span (endOf, newNumber, parentFor, reportEach)
 
 -- | The observer of one running operator.
 data Observer

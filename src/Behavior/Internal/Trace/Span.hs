@@ -11,6 +11,7 @@ module Behavior.Internal.Trace.Span
   , operatorSpan
   , branchSpan
   , abandonableIn
+  , endOf
 
     -- * For reactions
   , newNumber
@@ -19,7 +20,15 @@ module Behavior.Internal.Trace.Span
   ) where
 
 import Control.Concurrent.MVar (withMVar)
-import Control.Exception (SomeException, mask, throwIO, try, uninterruptibleMask_)
+import Control.Exception
+  ( Exception (..)
+  , SomeException
+  , evaluate
+  , mask
+  , throwIO
+  , try
+  , uninterruptibleMask_
+  )
 import Control.Monad (unless, when)
 import Data.Foldable (for_, traverse_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef)
@@ -27,10 +36,10 @@ import qualified Data.IntMap.Strict as IntMap
 import Data.Maybe (isJust)
 import Data.Traversable (for)
 
-import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Failure (Behavior, BehaviorFailed (..), StoppedWithFault (..), isCancellation)
 import Behavior.Internal.Runtime.Backend (Label, Simulator (pause, recordNote))
 import Behavior.Internal.Runtime.Dispatch (inSimulation)
-import Behavior.Internal.Stop (atPath, endOf)
+import Behavior.Internal.Stop (atPath, causeOf, displayed)
 import Behavior.Internal.Trace.Event
 import Behavior.Internal.Trace.Place
 
@@ -132,6 +141,17 @@ spanning kind name place act = do
   pure end
  where
   inTurn report = if null (abandonable place) then report else oneAtATime (trace place) report
+
+-- | How a behaviour ended that returned or threw.
+endOf :: Either SomeException a -> IO End
+endOf = either (\e -> try (evaluate (kind e)) >>= either undefinedException pure) (\_ -> pure Succeeded)
+ where
+  kind e
+    | Just (BehaviorFailed _ failure) <- fromException e = FailedWith (displayException failure)
+    | Just (StoppedWithFault _ fault) <- fromException e = FaultedWith (displayed fault)
+    | isCancellation e = StoppedBy $! causeOf e
+    | otherwise = FaultedWith (displayed e)
+  undefinedException e = pure (FaultedWith (displayed e))
 
 -- | Registers an open span in the branches around it that may be abandoned. If one has been
 -- abandoned, the span's parent has ended: so its parent is unknown.
