@@ -20,7 +20,7 @@ import Test.Hspec hiding (parallel)
 import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
 import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Runtime
-import Behavior.Internal.Scope
+import Behavior.Internal.Scope hiding (Outcome (..))
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly)
 import Support

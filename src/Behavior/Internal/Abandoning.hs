@@ -97,8 +97,8 @@ stopWithin limit isAbandoned endSpans scope cause acting = do
     awaitUninterruptibly (awaitOutcome acting) >>= report . HasEnded . \case
       Completed _ -> Nothing
       Stopped _ -> Nothing
-      Failing e -> Just e
-      Faulted e -> Just e
+      FailedWith e -> Just e
+      FaultedWith e -> Just e
   -- What the users' handler throws, of whatever type, must not end the watcher.
   report what = void (try (reportUncaught what) :: IO (Either SomeException ()))
 

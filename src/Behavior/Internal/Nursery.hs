@@ -149,8 +149,8 @@ thrownBy :: Outcome a -> Maybe SomeException
 thrownBy = \case
   Completed _ -> Nothing
   Stopped _ -> Nothing
-  Failing e -> Just e
-  Faulted e -> Just e
+  FailedWith e -> Just e
+  FaultedWith e -> Just e
 
 -- | Starts a behaviour that runs until it ends by itself, is stopped by 'requestStop', or
 -- 'scoped' ends. It has been started when 'fork' returns.

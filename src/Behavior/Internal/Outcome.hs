@@ -34,9 +34,9 @@ data Outcome a
   = -- | It returned, perhaps although its stop was requested.
     Completed a
   | -- | It failed.
-    Failing SomeException
+    FailedWith SomeException
   | -- | It threw anything else, perhaps while it was being stopped.
-    Faulted SomeException
+    FaultedWith SomeException
   | -- | Its stop was requested, and it stopped.
     Stopped SomeException
 
@@ -48,8 +48,8 @@ outcomeToIO = either throwIO pure . result
 result :: Outcome a -> Either SomeException a
 result = \case
   Completed a -> Right a
-  Failing e -> Left e
-  Faulted e -> Left e
+  FailedWith e -> Left e
+  FaultedWith e -> Left e
   Stopped e -> Left e
 
 -- | The outcome of a branch whose action ended like this. If the exception that it threw is undefined, what
@@ -59,15 +59,15 @@ classify = \case
   Right a -> pure (Completed a)
   Left e -> do
     self <- myThreadId
-    try (evaluate (kind self e)) >>= either (fmap Faulted . defined) pure
+    try (evaluate (kind self e)) >>= either (fmap FaultedWith . defined) pure
  where
   kind self e
     | isStopOf self e = Stopped e
     | otherwise = kindOfOther self (forced e)
   kindOfOther self e
-    | Just (StoppedWithFault cause fault) <- fromException e, isStopOf self cause = Faulted $! forced fault
-    | isFailure e = Failing e
-    | otherwise = Faulted e
+    | Just (StoppedWithFault cause fault) <- fromException e, isStopOf self cause = FaultedWith $! forced fault
+    | isFailure e = FailedWith e
+    | otherwise = FaultedWith e
 
 -- | The exception; or if it is itself undefined, what it throws.
 defined :: SomeException -> IO SomeException

@@ -286,7 +286,7 @@ type Ends a = Either (Int, SomeException) (IntMap (Either BehaviorFailed a))
 addEnd :: TVar (Ends a) -> Int -> Outcome a -> STM ()
 addEnd ends n end = modifyTVar' ends $ case (end, result end) of
   (_, Right a) -> (IntMap.insert n (Right a) <$!>)
-  (Failing _, Left e) | Just failure <- fromException e -> (IntMap.insert n (Left failure) <$!>)
+  (FailedWith _, Left e) | Just failure <- fromException e -> (IntMap.insert n (Left failure) <$!>)
   (_, Left e) -> (>> Left (n, e))
 
 -- | Why the rest is stopped when these branches have ended: they failed, or not all of them did.

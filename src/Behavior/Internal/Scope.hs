@@ -175,7 +175,7 @@ stopAll scope state cause before = do
         (fmap ((,) thrown) <$> tryReadOutcome b)
         (interruptibleOnce thrown (atomically (outcome b)))
     pure $! case o of
-      Faulted e -> (thrown', e : faults)
+      FaultedWith e -> (thrown', e : faults)
       _ -> (thrown', faults)
   -- Waits interruptibly until something is thrown; from then on uninterruptibly.
   interruptibleOnce thrown wait = case thrown of
@@ -237,7 +237,7 @@ forgetEnded scope = do
     end <- tryReadOutcome b
     pure $! case end of
       Nothing -> keep
-      Just (Faulted _) -> keep
+      Just (FaultedWith _) -> keep
       Just _ -> (left, others)
    where
     keep = let left' = left + 1 :: Int in left' `seq` (left', this : others)

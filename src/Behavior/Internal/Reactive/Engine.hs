@@ -192,7 +192,7 @@ recover engine sensors cause name recovery taskOutcome = do
       ends <- traverse awaitOutcome sensors
       -- (What has faulted stays in the scope.)
       _ <- forgetEnded (scope engine)
-      case [fault | Faulted fault <- ends] of
+      case [fault | FaultedWith fault <- ends] of
         [] -> startOver engine Reread
         fault : _ -> concluding (throwIO fault)
  where

@@ -109,7 +109,7 @@ pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
   resumed <- branch scope "resume" resume >>= awaitUninterruptibly . awaitOutcome
   pure . Verdict cause $ do
     case paused of
-      Failing e -> throwIO e
+      FailedWith e -> throwIO e
       _ -> pure ()
     outcomeToIO resumed
     either throwIO pure stopped

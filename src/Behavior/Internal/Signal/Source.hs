@@ -281,6 +281,6 @@ sensorError = foldr orDied (pure Nothing)
  where
   orDied sensor others = tryReadOutcomeSTM sensor >>= maybe others (pure . Just) . (>>= cause)
   cause = \case
-    Failing e -> Just e
-    Faulted e -> Just e
+    FailedWith e -> Just e
+    FaultedWith e -> Just e
     _ -> Nothing
