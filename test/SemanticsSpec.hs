@@ -280,27 +280,27 @@ relation = do
   describe "Sequences and fallbacks" $ do
     it "run the second program when the first fails, and not when it faults" $ do
       (act "a" 1 Fails `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 3 (Succeeded (Number 7))]
-      (act "a" 1 Faults `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 1 (Faulted "a")]
+      (act "a" 1 Faults `Else` act "b" 2 (Succeeds 7)) `endsIn` [Gave 1 (FaultedWith "a")]
     it "throw the last failure of several attempts" $ do
-      Attempt 2 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 3 (Failed "a")]
+      Attempt 2 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)]) `endsIn` [Gave 3 (FailedWith "a")]
       Attempt 3 (Do "a" [script 1 Fails, script 2 Fails, script 3 (Succeeds 7)])
         `endsIn` [Gave 6 (Succeeded (Number 7))]
-      Attempt 0 (act "a" 1 (Succeeds 7)) `endsIn` [Gave 0 (Failed noAlternative)]
-      FallbackOver [] `endsIn` [Gave 0 (Failed noAlternative)]
+      Attempt 0 (act "a" 1 (Succeeds 7)) `endsIn` [Gave 0 (FailedWith noAlternative)]
+      FallbackOver [] `endsIn` [Gave 0 (FailedWith noAlternative)]
 
   describe "Concurrent operators" $ do
     it "end with the first branch to finish" $
       Parallel (act "a" 1 (Succeeds 0)) (act "b" 2 Faults) `endsIn` [Gave 1 (Succeeded Unit)]
     it "may end with either branch when both finish at the same time" $
-      Parallel (act "a" 1 (Succeeds 0)) (act "b" 1 Fails) `endsIn` [Gave 1 (Succeeded Unit), Gave 1 (Failed "b")]
+      Parallel (act "a" 1 (Succeeds 0)) (act "b" 1 Fails) `endsIn` [Gave 1 (Succeeded Unit), Gave 1 (FailedWith "b")]
     it "throw the leftmost fault, not the first" $
       FirstOf [act "a" 1 Fails, stoppedBy (EndsAfter 3 Faults) "b", stoppedBy (EndsAfter 1 Faults) "c"]
-        `endsIn` [Gave 4 (Faulted (cleanupOf "b"))]
+        `endsIn` [Gave 4 (FaultedWith (cleanupOf "b"))]
     it "wait for all branches, or for the first that fails" $ do
       AllOf [act "a" 2 (Succeeds 1), act "b" 1 (Succeeds 2)]
         `endsIn` [Gave 2 (Succeeded (Several [Number 1, Number 2]))]
-      AllOf [act "a" 2 (Succeeds 1), act "b" 1 Fails] `endsIn` [Gave 1 (Failed "b")]
-      Both (act "a" 2 Fails) (stoppedBy (StopsAfter 3) "b") `endsIn` [Gave 5 (Failed "a")]
+      AllOf [act "a" 2 (Succeeds 1), act "b" 1 Fails] `endsIn` [Gave 1 (FailedWith "b")]
+      Both (act "a" 2 Fails) (stoppedBy (StopsAfter 3) "b") `endsIn` [Gave 5 (FailedWith "a")]
     it "decide as soon as enough have succeeded, or too few are left, and then run what is chosen" $ do
       let of3 m =
             Decide
@@ -309,17 +309,17 @@ relation = do
               (act "d" 1 (Succeeds 7))
       of3 0 `endsIn` [Gave 1 (Succeeded (Number 7))]
       of3 1 `endsIn` [Gave 6 (Succeeded (Number 7))]
-      of3 3 `endsIn` [Gave 3 (Failed tooFew)]
+      of3 3 `endsIn` [Gave 3 (FailedWith tooFew)]
       Decide NoChoice [act "a" 3 (Succeeds 1), act "b" 1 Fails] (act "d" 1 (Succeeds 7))
-        `endsIn` [Gave 3 (Faulted noneChosen)]
+        `endsIn` [Gave 3 (FaultedWith noneChosen)]
     it "stop the children when the body ends, and body and children when a child fails" $ do
       Scoped (Fork (stoppedBy (StopsAfter 2) "a") `Then` act "b" 1 (Succeeds 7))
         `endsIn` [Gave 3 (Succeeded (Number 7))]
-      Scoped (Fork (act "a" 1 Fails) `Then` stoppedBy (StopsAfter 2) "b") `endsIn` [Gave 3 (Failed "a")]
+      Scoped (Fork (act "a" 1 Fails) `Then` stoppedBy (StopsAfter 2) "b") `endsIn` [Gave 3 (FailedWith "a")]
     it "wait for a child's result, and throw its failure" $ do
       Scoped (Await (act "a" 3 (Succeeds 7)) (act "b" 1 (Succeeds 1))) `endsIn` [Gave 3 (Succeeded (Number 7))]
       Scoped (Await (act "a" 3 Fails) (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 1))
-        `endsIn` [Gave 3 (Failed "a")]
+        `endsIn` [Gave 3 (FailedWith "a")]
 
     it "stop a child by its handle, which is a failure where the child is awaited, and not of the scope" $ do
       Scoped (StopChild (stoppedBy (StopsAfter 2) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7))
@@ -327,7 +327,7 @@ relation = do
       Scoped (StopChild (stoppedBy (EndsAfter 2 (Succeeds 7)) "a") (act "b" 1 (Succeeds 1)))
         `endsIn` [Gave 3 (Succeeded (Number 7))]
       Scoped (StopChild (stoppedBy (EndsAfter 2 Faults) "a") (act "b" 1 (Succeeds 1)) `Else` act "c" 1 (Succeeds 7))
-        `endsIn` [Gave 3 (Faulted (cleanupOf "a"))]
+        `endsIn` [Gave 3 (FaultedWith (cleanupOf "a"))]
     it "let a fork fail while the scope stops its branches" $
       Scoped
         ( Fork (Do "a" [(script 2 (Succeeds 0)) {masking = Uninterruptible}] `Then` Fork (act "b" 1 Faults))
@@ -339,13 +339,13 @@ relation = do
     it "keeps the result of a branch that completes despite its stop request" $
       Timeout 1 (stoppedBy (EndsAfter 2 (Succeeds 7)) "a") `endsIn` [Gave 3 (Succeeded (Number 7))]
     it "throws the fault of a cleanup" $
-      Timeout 1 (stoppedBy (EndsAfter 2 Faults) "a") `endsIn` [Gave 3 (Faulted (cleanupOf "a"))]
+      Timeout 1 (stoppedBy (EndsAfter 2 Faults) "a") `endsIn` [Gave 3 (FaultedWith (cleanupOf "a"))]
     it "throws the fault of a cleanup through several operators" $
       Timeout 1 (Parallel (stoppedBy StopsAtOnce "a") (Timeout 5 (stoppedBy (EndsAfter 2 Faults) "b")))
-        `endsIn` [Gave 3 (Faulted (cleanupOf "b"))]
+        `endsIn` [Gave 3 (FaultedWith (cleanupOf "b"))]
     it "waits for a branch that is masked uninterruptibly" $
       Timeout 1 (Do "a" [(script 4 (Succeeds 7)) {masking = Uninterruptible}] `Then` act "b" 1 (Succeeds 0))
-        `endsIn` [Gave 4 (Failed (timedOut 1))]
+        `endsIn` [Gave 4 (FailedWith (timedOut 1))]
 
     it "throws the fault of a cleanup together with another thread's cancellation" $ do
       cancelledTwice (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))
@@ -377,7 +377,7 @@ relation = do
                ]
     it "start a monitor's recovery even if the task's cleanup fails, and that failure is thrown after it" $
       with [Change 1 "p" (At 1)] (Monitor (Watched "p") (act "r" 2 (Succeeds 0)) (stoppedBy (EndsAfter 1 Fails) "t"))
-        `endsWith` [Gave 4 (Failed (cleanupOf "t"))]
+        `endsWith` [Gave 4 (FailedWith (cleanupOf "t"))]
     it "are read again after a branch was stopped" $
       with
         [Change 1 "p" (At 1), Change 2 "p" (At 0)]
@@ -385,9 +385,9 @@ relation = do
         `endsWith` [Gave 6 (Succeeded (Number 2))]
     it "are not false when they have no value any more, or fault" $ do
       with [Change 1 "p" NoValue] (RSelect (Watched "p") (act "l" 3 (Succeeds 1)) (act "r" 3 (Succeeds 2)))
-        `endsWith` [Gave 1 (Failed noValue)]
+        `endsWith` [Gave 1 (FailedWith noValue)]
       with [Change 1 "p" Faulting] (WhileHolding (Watched "p") (act "a" 3 (Succeeds 1)) `Else` WaitUntil (Watched "p"))
-        `endsWith` [Gave 1 (Faulted "p")]
+        `endsWith` [Gave 1 (FaultedWith "p")]
     it "skip the slots that a slow reading has missed" $
       WaitUntil (Polled 2 (Do "s" [script 0 (Succeeds 0), script 3 (Succeeds 0), script 0 (Succeeds 1)]))
         `endsIn` [Gave 6 (Succeeded Unit)]
@@ -409,14 +409,14 @@ relation = do
             (Hysteresis False 0 2 (Watched "p"))
             (WaitUntil Shared `Then` WhileHolding Shared (act "a" 9 (Succeeds 7)))
         )
-        `endsWith` [Gave 3 (Failed doesNotHold)]
+        `endsWith` [Gave 3 (FailedWith doesNotHold)]
     it "with a debounce ignore a short change" $
       with [Change 1 "p" (At 1), Change 2 "p" (At 0), Change 3 "p" (At 1)] (WaitUntil (Debounce 2 (Watched "p")))
         `endsWith` [Gave 5 (Succeeded Unit)]
     it "with a throttle take a change when the time has passed since the one before" $
       with [Change 1 "p" (At 1)] (WaitUntil (Throttle 3 (Watched "p"))) `endsWith` [Gave 3 (Succeeded Unit)]
     it "fail while a reading takes too long, and the operator waits for the reading to stop" $
-      WaitUntil (StaleAfter 2 (Polled 1 (stoppedBy (StopsAfter 3) "s"))) `endsIn` [Gave 5 (Failed (overdueBy 2))]
+      WaitUntil (StaleAfter 2 (Polled 1 (stoppedBy (StopsAfter 3) "s"))) `endsIn` [Gave 5 (FailedWith (overdueBy 2))]
     it "are read once for all operators that share them" $
       WithShared
         (Polled 2 (Do "s" [script 0 (Succeeds 0), script 0 (Succeeds 0), script 0 (Succeeds 1)]))
@@ -424,7 +424,7 @@ relation = do
         `endsIn` [Gave 4 (Succeeded Unit)]
     it "stop together with the body that shares them, whose fault comes first" $
       Timeout 1 (WithShared (Polled 1 (stoppedBy (EndsAfter 0 Faults) "s")) (stoppedBy (EndsAfter 2 Faults) "b"))
-        `endsIn` [Gave 3 (Faulted (cleanupOf "b"))]
+        `endsIn` [Gave 3 (FaultedWith (cleanupOf "b"))]
  where
   act name n how = Do name [script n how]
   script n how = Script n how Unmasked StopsAtOnce

@@ -55,15 +55,15 @@ begin t p = case p of
   Then first second -> andThen t (begin t first) second
   Else first second -> orElse t (begin t first) second
   Attempt n act
-    | n <= 0 -> Over (Failed noAlternative)
+    | n <= 0 -> Over (FailedWith noAlternative)
     | n == 1 -> begin t act
     | otherwise -> begin t (act `Else` Attempt (n - 1) act)
-  FallbackOver [] -> Over (Failed noAlternative)
+  FallbackOver [] -> Over (FailedWith noAlternative)
   FallbackOver [act] -> begin t act
   FallbackOver (act : acts) -> begin t (act `Else` FallbackOver acts)
   Parallel left right -> Waiting Race [thread t "parallel: left" (void left), thread t "parallel: right" (void right)]
   Both left right -> Waiting Gather [thread t "both: left" left, thread t "both: right" right] `AndThen` Pure Unit
-  FirstOf [] -> Over (Failed noAlternative)
+  FirstOf [] -> Over (FailedWith noAlternative)
   FirstOf acts -> Waiting Race (numbered "firstOf: " acts)
   AllOf acts -> Waiting Gather (numbered "allOf: " acts)
   Decide choice acts chosen -> case chosenBy choice (Nothing <$ acts) of
@@ -96,7 +96,7 @@ andThen, orElse :: Now -> Running -> Program -> Running
 andThen t (Over (Succeeded _)) second = next t second
 andThen _ (Over other) _ = Over other
 andThen _ first second = first `AndThen` second
-orElse t (Over (Failed _)) second = next t second
+orElse t (Over (FailedWith _)) second = next t second
 orElse _ (Over other) _ = Over other
 orElse _ first second = first `OrElse` second
 
@@ -105,14 +105,14 @@ orElse _ first second = first `OrElse` second
 -- scheduling point there.)
 next :: Now -> Program -> Running
 next t second = case begin t second of
-  Over (Failed _) -> Starting second
+  Over (FailedWith _) -> Starting second
   begun -> begun
 
 ended :: Name -> Ending -> Result
 ended name = \case
   Succeeds n -> Succeeded (Number n)
-  Fails -> Failed name
-  Faults -> Faulted name
+  Fails -> FailedWith name
+  Faults -> FaultedWith name
 
 -- | A new thread, whose stop may be requested before its first step.
 thread :: Now -> Label -> Program -> Thread

@@ -208,8 +208,8 @@ data Change = Change Ticks Condition Level
 -- | How a program, or a branch, ends.
 data Result
   = Succeeded Value
-  | Failed String
-  | Faulted String
+  | FailedWith String
+  | FaultedWith String
   | -- | It stopped because of a stop request; a fault may have occurred while it stopped.
     Stopped (Maybe String)
   deriving (Eq, Ord, Show)

@@ -38,7 +38,7 @@ import Data.Maybe (catMaybes, fromMaybe, isJust, isNothing)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Failure hiding (Failed (..))
+import Behavior.Internal.Failure
 import Behavior.Internal.Nursery
 import Behavior.Internal.Parallel (allOf, both, decide, firstOf, parallel)
 import Behavior.Internal.Reactive.Operators
@@ -342,8 +342,8 @@ thrown :: SomeException -> Result
 thrown e
   | Just (StoppedWithFault _ fault) <- fromException e = Stopped (Just (show fault))
   | isStopRequest e = Stopped Nothing
-  | Just (BehaviorFailed _ failure) <- fromException e = Failed (withoutNames (show failure))
-  | otherwise = Faulted (show e)
+  | Just (BehaviorFailed _ failure) <- fromException e = FailedWith (withoutNames (show failure))
+  | otherwise = FaultedWith (show e)
 
 -- | The text of a failure; the relation does not name the signals of a condition.
 withoutNames :: String -> String

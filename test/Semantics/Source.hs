@@ -161,10 +161,10 @@ readSource :: Now -> ReadMode -> View -> Source -> Maybe (Either Result (Int, No
 readSource t mode v source = case (source, v) of
   (Watching condition, _) -> case (Map.lookup condition (levels t), mode) of
     (Just (At n), _) -> gives n
-    (Just Failing, _) -> wrong (Failed condition)
-    (Just Faulting, _) -> wrong (Faulted condition)
+    (Just Failing, _) -> wrong (FailedWith condition)
+    (Just Faulting, _) -> wrong (FaultedWith condition)
     (_, FirstRead) -> Nothing
-    (_, Reread) -> wrong (Failed noValue)
+    (_, Reread) -> wrong (FailedWith noValue)
   (Deadline end, _) -> gives (fromEnum (clock t >= end))
   (Polling s, After n _) -> case newest s of
     Just (k, result) | k > n -> case result of
@@ -180,7 +180,7 @@ readSource t mode v source = case (source, v) of
   (Throttled h inner, _) -> inside v inner $ \_ t' inner' ->
     passed h >>= \n -> found n t' (Throttled h inner')
   (WithWatchdog w inner, After n v')
-    | odd (overdue w) || overdue w > n -> wrong (Failed (overdueBy (limit w)))
+    | odd (overdue w) || overdue w > n -> wrong (FailedWith (overdueBy (limit w)))
     | otherwise -> inside v' inner $ \m t' inner' -> found m t' (WithWatchdog w inner')
   -- If a poller of the shared source has died, the reading fails, whatever the value is.
   (SharedSource, _) | s : outer <- shared t -> case deadPollers s of
@@ -271,12 +271,12 @@ deadPollers :: Source -> [Result]
 deadPollers = filter isDead . pollerEnds
  where
   isDead = \case
-    Failed _ -> True
-    Faulted _ -> True
+    FailedWith _ -> True
+    FaultedWith _ -> True
     _ -> False
 
 pollerFaults :: Source -> [String]
-pollerFaults source = [fault | Faulted fault <- pollerEnds source]
+pollerFaults source = [fault | FaultedWith fault <- pollerEnds source]
 
 -- | The part of a source that must still be awaited after its stop was requested, when it is
 -- not read any more: its pollers. (The threads of filters stop at once.)
@@ -284,7 +284,7 @@ remaining :: Source -> Source
 remaining = Joined AllHold . pollers
  where
   pollers = \case
-    s@(Polling Poller {poll = PollEnded (Faulted _)}) -> [s]
+    s@(Polling Poller {poll = PollEnded (FaultedWith _)}) -> [s]
     Polling Poller {poll = PollEnded _} -> []
     s@(Polling _) -> [s]
     Joined _ sources -> concatMap pollers sources

@@ -217,7 +217,7 @@ requestStop = \case
 -- stopping is a fault.
 asOutcome :: Result -> Result
 asOutcome = \case
-  Stopped (Just fault) -> Faulted fault
+  Stopped (Just fault) -> FaultedWith fault
   other -> other
 
 -- | How a thread ended, if that is published.
@@ -233,7 +233,7 @@ completed thread' = case endOf thread' of
   _ -> False
 
 faultOf :: Thread -> [String]
-faultOf thread' = [fault | Just (Faulted fault) <- [endOf thread']]
+faultOf thread' = [fault | Just (FaultedWith fault) <- [endOf thread']]
 
 threadsOf :: Phase -> [Thread]
 threadsOf = \case

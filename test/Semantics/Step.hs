@@ -93,7 +93,7 @@ steps t = \case
       | operator == Share = withSharedSource source (\t' -> oneOf (threadSteps t') threads)
       | otherwise = [(l, t', (source, threads')) | (l, t', threads') <- oneOf (threadSteps t) threads]
   Forking p wanted ->
-    (Refused, t, Over (Failed tooLate)) : case wanted of
+    (Refused, t, Over (FailedWith tooLate)) : case wanted of
       Nothing -> [(Forks Nothing p, t, Forked Nothing)]
       Just (stops, meanwhile) ->
         let k = length (takeWhile id (zipWith (==) [0 ..] (Map.keys (childResults t))))
@@ -290,7 +290,7 @@ threadSteps t (Thread label state) = case state of
     r -> Thread label (Live requests r)
   ends' t' result = (Emits (IsOver label), t', Thread label (Ended (asOutcome result)))
   answer = \case
-    Stopped _ -> Failed childStopped
+    Stopped _ -> FailedWith childStopped
     result -> result
 
 -- * Reactive operators
@@ -357,7 +357,7 @@ reactions t p source v phase = case phase of
 afterSensorStep :: Now -> Program -> Source -> View -> Phase -> Running
 afterSensorStep t p source v phase = case phase of
   AwaitingSensors
-    | not (null (pollerFaults source)) -> conclude React (Failed "a sensor faulted") source []
+    | not (null (pollerFaults source)) -> conclude React (FailedWith "a sensor faulted") source []
     | allStopped source, any usesShared (signals p) -> Reacting p source v Restarting
     | allStopped source -> restarted t p source
   _ -> Reacting p source v phase

@@ -37,9 +37,9 @@ verdict operator threads = case operator of
     | otherwise -> firstOf wrongs
   -- A fault; or the choice.
   Decision choice
-    | Just fault <- firstOf [result | result@(Faulted _) <- ends'] -> Just fault
+    | Just fault <- firstOf [result | result@(FaultedWith _) <- ends'] -> Just fault
     | Just chosen <- chosenBy choice (map endOf threads) -> Just chosen
-    | all over threads -> Just (Faulted noneChosen)
+    | all over threads -> Just (FaultedWith noneChosen)
     | otherwise -> Nothing
   -- The body, however it ends; or a child that fails or faults (not one that stops).
   Nursery -> case threads of
@@ -56,7 +56,7 @@ chosenBy :: Choice -> [Maybe Result] -> Maybe Result
 chosenBy choice ends' = case choice of
   AtLeast m
     | succeeded >= m -> Just (Succeeded Unit)
-    | succeeded + length (filter (== Nothing) ends') < m -> Just (Failed tooFew)
+    | succeeded + length (filter (== Nothing) ends') < m -> Just (FailedWith tooFew)
   FirstEnd | result : _ <- catMaybes ends' -> Just $ case result of
     Succeeded _ -> Succeeded Unit
     wrong -> wrong
@@ -87,7 +87,7 @@ concluding operator result source threads
 outcome :: Operator -> Result -> Source -> [Thread] -> Result
 outcome operator result source threads = case (result, faults) of
   (Stopped _, fault : _) -> Stopped (Just fault)
-  (_, fault : _) -> Faulted fault
+  (_, fault : _) -> FaultedWith fault
   _ -> result
  where
   faults
@@ -113,8 +113,8 @@ reaction p value = case p of
   Switch _ branches -> Run (branches !! max 0 (min value (length branches - 1)))
   TeleoReactive rules -> if value < 0 then Idle else Run (snd (rules !! value))
   WaitUntil _ -> if isTrue then Conclude (Succeeded Unit) else Idle
-  WhileHolding _ act -> if isTrue then Run act else Conclude (Failed doesNotHold)
-  Timeout most act -> if isTrue then Conclude (Failed (timedOut most)) else Run act
+  WhileHolding _ act -> if isTrue then Run act else Conclude (FailedWith doesNotHold)
+  Timeout most act -> if isTrue then Conclude (FailedWith (timedOut most)) else Run act
   _ -> Idle
  where
   isTrue = holds value
