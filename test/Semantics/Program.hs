@@ -18,7 +18,7 @@ module Semantics.Program
   , Script (..)
   , Masking (..)
   , Ending (..)
-  , Response (..)
+  , OnStop (..)
 
     -- * Conditions
   , Condition
@@ -125,7 +125,7 @@ data Script = Script
   { takes :: Ticks
   , ends :: Ending
   , masking :: Masking
-  , onStop :: Response
+  , onStop :: OnStop
   }
   deriving (Eq, Ord, Show)
 
@@ -145,7 +145,7 @@ data Ending
   deriving (Eq, Ord, Show)
 
 -- | What an action does after it has received a stop request.
-data Response
+data OnStop
   = StopsAtOnce
   | -- | Stops after a cleanup of the given number of ticks.
     StopsAfter Ticks

@@ -13,7 +13,7 @@ module Semantics.State
   , ThreadState (..)
   , Phase (..)
   , ReadMode (..)
-  , Reaction (..)
+  , Response (..)
 
     -- * The sources of a signal
   , Source (..)
@@ -138,12 +138,12 @@ data ThreadState
 data Phase
   = -- | No branch runs: the signal's current value decides what comes next.
     Choosing ReadMode
-  | -- | The reaction to this value is to wait for a different one.
+  | -- | The response to this value is to wait for a different one.
     Idling Int
   | -- | The branch for this value runs.
     Following Int Thread
-  | -- | The branch's stop was requested; this reaction comes next.
-    Stopping Reaction Thread
+  | -- | The branch's stop was requested; this response comes next.
+    Stopping Response Thread
   | -- | The recovery runs, and the signal is not read. The first thread is the branch that was
     -- stopped for it, if that failed or faulted.
     Recovering (Maybe Thread) Thread
@@ -158,7 +158,7 @@ data ReadMode
   | Reread
   deriving (Eq, Ord, Show)
 
-data Reaction
+data Response
   = Run Program
   | RunToEnd Program
   | Idle

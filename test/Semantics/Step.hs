@@ -312,7 +312,7 @@ reactions t p source v phase = case phase of
         (Just result, _) -> silently t (conclude React result source [branch])
         (_, Just (Left wrong)) -> silently t (stopping (Conclude wrong) source branch)
         (_, Just (Right seen@(value, t', source')))
-          | differs old seen -> silently t' (stopping (reaction p (valueOf p value)) source' branch)
+          | differs old seen -> silently t' (stopping (response p (valueOf p value)) source' branch)
         _ -> []
   Stopping next branch -> case endOf branch of
     Just result -> silently t (afterStop next result branch)
@@ -325,7 +325,7 @@ reactions t p source v phase = case phase of
  where
   inThread inPlace branch = [(l, t', Reacting p source v (inPlace branch')) | (l, t', branch') <- threadSteps t branch]
   differs old (value, _, _) = valueOf p value /= old
-  react (seen, t', source') = silently t' $ case reaction p value of
+  react (seen, t', source') = silently t' $ case response p value of
     Run act -> Reacting p source' v (Following value (thread t' (nameOf p value) act))
     RunToEnd recovery -> recover Nothing (requestStopOfSource source') recovery
     Idle -> Reacting p source' v (Idling value)

@@ -11,7 +11,7 @@ module Semantics.Verdict
 
     -- * Reactions to signals
   , valueOf
-  , reaction
+  , response
   , nameOf
   , recoveryOf
   ) where
@@ -104,9 +104,9 @@ valueOf p value = case p of
   TeleoReactive _ -> value
   _ -> fromEnum (holds value)
 
--- | The reaction to the value of the signal.
-reaction :: Program -> Int -> Reaction
-reaction p value = case p of
+-- | The response to the value of the signal.
+response :: Program -> Int -> Response
+response p value = case p of
   RSelect _ left right -> Run (if isTrue then left else right)
   Monitor _ recovery task -> if isTrue then RunToEnd recovery else Run task
   InsteadWhen _ emergency act -> if isTrue then RunToEnd emergency else Run act
