@@ -115,7 +115,7 @@ ended name = \case
   Faults -> FaultedWith name
 
 -- | A new thread, whose stop may be requested before its first step.
-thread :: Now -> Label -> Program -> Thread
+thread :: Now -> BranchLabel -> Program -> Thread
 thread t label p = Thread label (Live NotStarted starting)
  where
   starting = if canWait begun then begun else Starting p

@@ -11,7 +11,7 @@ module Semantics.Program
   , Choice (..)
   , Signal (..)
   , Name
-  , Label
+  , BranchLabel
   , Ticks
 
     -- * What actions do
@@ -159,7 +159,7 @@ data OnStop
 type Condition = Name
 
 -- | The label of a branch: the operator's name and the branch's.
-type Label = String
+type BranchLabel = String
 
 -- | The state of a condition.
 data Level
@@ -227,7 +227,7 @@ data Transition
   | Action Name ActionEvent
   | Becomes Condition Level
   | -- | The end of the branch with this label is published.
-    IsOver Label
+    IsOver BranchLabel
   deriving (Eq, Ord, Show)
 
 data ActionEvent

@@ -43,7 +43,7 @@ import Behavior.Internal.Nursery
 import Behavior.Internal.Parallel (allOf, both, decide, firstOf, parallel)
 import Behavior.Internal.Reactive.Operators
 import Behavior.Internal.Reactive.Timeout
-import Behavior.Internal.Runtime hiding (Label)
+import Behavior.Internal.Runtime
 import Behavior.Internal.Signal.Filter (debounce, hysteresis, throttle)
 import Behavior.Internal.Signal.Polling
 import Behavior.Internal.Signal.Shared (withShared)
@@ -66,7 +66,7 @@ import Behavior.Sim
   )
 import qualified Behavior.Sim as Sim
 import Semantics.Path (End (..), Seen (..))
-import Semantics.Program hiding (Label)
+import Semantics.Program
 
 -- | Simulates the world's program under a schedule, and returns what was observed, or the
 -- reason why the run had no proper end.
@@ -203,7 +203,7 @@ behavior instrument emit world = do
       firstOf [running (inBranch instrument "firstOf: 1" within), timeIsUp <$ environment stage]
     PlainThread type' later -> do
       thread <-
-        mask_ (start (Sim.Label "plain thread" "") (running (inBranch instrument "plain thread" (root instrument))))
+        mask_ (start (Label "plain thread" "") (running (inBranch instrument "plain thread" (root instrument))))
       let interrupting = case type' of
             Asynchronous -> throwToAll (const Enough) [threadId thread]
             Synchronous -> throwToAll (const EnoughOfThis) [threadId thread]

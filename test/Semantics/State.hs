@@ -122,7 +122,7 @@ data Operator
   deriving (Eq, Ord, Show)
 
 -- | A branch of an operator.
-data Thread = Thread Label ThreadState
+data Thread = Thread BranchLabel ThreadState
   deriving (Eq, Ord, Show)
 
 data ThreadState

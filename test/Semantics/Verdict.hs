@@ -120,7 +120,7 @@ response p value = case p of
   isTrue = holds value
 
 -- | The name of the branch for a value.
-nameOf :: Program -> Int -> Label
+nameOf :: Program -> Int -> BranchLabel
 nameOf p value = case p of
   RSelect {} -> if holds value then "rSelect: left" else "rSelect: right"
   Monitor {} -> "monitor: task"
@@ -131,7 +131,7 @@ nameOf p value = case p of
   _ -> "timeout: branch"
 
 -- | The name of the branch that runs to its end.
-recoveryOf :: Program -> Label
+recoveryOf :: Program -> BranchLabel
 recoveryOf p = case p of
   InsteadWhen {} -> "insteadWhen: emergency"
   _ -> "monitor: recovery"
