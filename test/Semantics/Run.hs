@@ -180,7 +180,7 @@ observing instrument simulated world = do
 
 -- | The state that a program runs with: the conditions, the number of calls of each action,
 -- how to fork into the innermost scope, and the innermost shared signal.
-data Stage position = Stage
+data Context position = Context
   { levels :: Map Condition (TVar Level)
   , calls :: IORef (Map Name Int)
   , forking :: (position -> Behavior Value) -> Behavior (Child Value)
@@ -191,46 +191,46 @@ data Stage position = Stage
 -- not be a scheduling point.
 behavior :: Instrument position -> (Transition -> IO ()) -> World -> Behavior Value
 behavior instrument emit world = do
-  stage <-
-    Stage
+  context <-
+    Context
       <$> traverse newTVarIO (Map.fromList (conditions world))
       <*> newIORef Map.empty
       <*> pure noNursery
       <*> pure (pure 0)
-  let running at' = toBehavior instrument emit stage at' (program world)
+  let running at' = toBehavior instrument emit context at' (program world)
   case caller world of
     Operator -> aroundPart instrument (root instrument) (FirstOf [program world]) $ \_ within ->
-      firstOf [running (inBranch instrument "firstOf: 1" within), timeIsUp <$ environment stage]
+      firstOf [running (inBranch instrument "firstOf: 1" within), timeIsUp <$ environment context]
     PlainThread type' later -> do
       thread <-
         mask_ (start (Label "plain thread" "") (running (inBranch instrument "plain thread" (root instrument))))
       let interrupting = case type' of
             Asynchronous -> throwToAll (const Enough) [threadId thread]
             Synchronous -> throwToAll (const EnoughOfThis) [threadId thread]
-      environment stage
+      environment context
       interrupting
       sleepUntil (fromIntegral (cancelAt world + later))
       interrupting
       atomically (threadEnd thread) >>= either throwIO pure
  where
-  environment stage = do
+  environment context = do
     for_ (changes world) $ \(Change when condition level) -> do
       sleepUntil (fromIntegral when)
-      for_ (Map.lookup condition (levels stage)) $ \var ->
+      for_ (Map.lookup condition (levels context)) $ \var ->
         atomically (writeTVar var level) >> whenSet instrument condition level
       emit (condition `Becomes` level)
     sleepUntil (fromIntegral (cancelAt world))
   noNursery _ = throwIO (ErrorCall "a fork outside every scope")
 
-toBehavior :: Instrument position -> (Transition -> IO ()) -> Stage position -> position -> Program -> Behavior Value
-toBehavior instrument emit stage = go
+toBehavior :: Instrument position -> (Transition -> IO ()) -> Context position -> position -> Program -> Behavior Value
+toBehavior instrument emit context = go
  where
   -- A part, and how it runs at its position; an operator's parts have the position within it.
   go here p = aroundPart instrument here p (part p)
   part p outer within = case p of
     Do name scripts -> do
       checkpoint
-      n <- atomicModifyIORef' (calls stage) $ \counts ->
+      n <- atomicModifyIORef' (calls context) $ \counts ->
         let n = Map.findWithDefault 0 name counts in (Map.insert name (n + 1) counts, n)
       act (emit . Action name) (aroundCleanup instrument outer) name (scripts !! min n (length scripts - 1))
     Pure value -> pure value
@@ -258,17 +258,17 @@ toBehavior instrument emit stage = go
     Timeout limit q -> timeout (fromIntegral limit) (branch "branch" q)
     WithShared signal q ->
       withShared (levelIn (labelled "polling") signal) $ \s ->
-        toBehavior instrument emit stage {nearest = s} (labelled "body") q
+        toBehavior instrument emit context {nearest = s} (labelled "body") q
     Scoped body -> scoped $ \nursery ->
       toBehavior
         instrument
         emit
-        stage {forking = \child -> fork nursery (child (labelled "fork"))}
+        context {forking = \child -> fork nursery (child (labelled "fork"))}
         (labelled "body")
         body
-    Fork q -> Unit <$ forking stage (`go` q)
-    Await q r -> forking stage (`go` q) >>= \child -> go outer r >> atomically (await child)
-    StopChild q r -> forking stage (`go` q) >>= \child -> go outer r >> requestStop child >> atomically (await child)
+    Fork q -> Unit <$ forking context (`go` q)
+    Await q r -> forking context (`go` q) >>= \child -> go outer r >> atomically (await child)
+    StopChild q r -> forking context (`go` q) >>= \child -> go outer r >> requestStop child >> atomically (await child)
    where
     labelled name = inBranch instrument (fromMaybe "" (operatorName p) ++ ": " ++ name) within
     branch name = go (labelled name)
@@ -282,9 +282,9 @@ toBehavior instrument emit stage = go
     Debounce n signal -> debounce (fromIntegral n) (levelIn sensor signal)
     Throttle n signal -> throttle (fromIntegral n) (levelIn sensor signal)
     StaleAfter n signal -> staleAfter (fromIntegral n) (levelIn sensor signal)
-    Shared -> nearest stage
+    Shared -> nearest context
   reading :: Condition -> STM Int
-  reading condition = case Map.lookup condition (levels stage) of
+  reading condition = case Map.lookup condition (levels context) of
     Nothing -> retry
     Just var ->
       readTVar var >>= \case
