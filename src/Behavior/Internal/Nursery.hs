@@ -38,18 +38,18 @@ import Behavior.Internal.Scope hiding (requestStop)
 
 -- | A place where behaviours run beside a 'scoped' one.
 --
--- (The stage and the requests are in separate variables: a thread that waits in 'fork' reads the
--- stage, and must not be woken by each request of another.)
+-- (The state and the requests are in separate variables: a thread that waits in 'fork' reads the
+-- state, and must not be woken by each request of another.)
 --
 -- @since 0.1.0.0
 data Nursery = Nursery
-  { stage :: !(TVar Stage)
+  { state :: !(TVar NurseryState)
   , requests :: !(TVar [Request])
   -- ^ Those that the scope's thread has not served yet, the newest first.
   }
 
--- | The stage of a nursery.
-data Stage
+-- | The state of a nursery.
+data NurseryState
   = Open
   | -- | Everything is being stopped. A child may be forking just then; a cleanup may fork, too.
     Ending
@@ -105,7 +105,7 @@ instance Exception ChildStopped where
 scoped :: (Nursery -> Behavior a) -> Behavior a
 scoped body = do
   nursery <- Nursery <$> newTVarIO Open <*> newTVarIO []
-  let enter = atomically . writeTVar (stage nursery)
+  let enter = atomically . writeTVar (state nursery)
   structured "scoped" (\scope -> serveRequests nursery scope (body nursery) `finally` enter Ending)
     `finally` enter Closed
 
@@ -166,15 +166,15 @@ fork :: Nursery -> Behavior a -> Behavior (Child a)
 fork nursery act = do
   accepted <- newEmptyTMVarIO
   -- (Without -threaded, GHC wakes those that wait for a variable also after a transaction that has only
-  -- read it. So this is none: if the stage changes before the request, that is not served.)
-  readTVarIO (stage nursery) >>= \case
+  -- read it. So this is none: if the state changes before the request, that is not served.)
+  readTVarIO (state nursery) >>= \case
     Open -> atomically (request nursery (Fork act accepted))
     Ending -> failEnding
     Closed -> throwIO (ErrorCall "fork: the nursery's scoped behaviour has ended")
   Child nursery <$> atomically (takeTMVar accepted `orElse` unlessOpen)
  where
   unlessOpen =
-    readTVar (stage nursery) >>= \case
+    readTVar (state nursery) >>= \case
       Open -> retry
       _ -> failEnding
   failEnding :: MonadThrow m => m a
@@ -226,7 +226,7 @@ tryAwait (Child _ child) = fmap ending <$> tryReadOutcomeSTM child
 -- @since 0.1.0.0
 requestStop :: Child a -> Behavior ()
 requestStop (Child nursery child) =
-  readTVarIO (stage nursery) >>= \case
+  readTVarIO (state nursery) >>= \case
     Open -> atomically (request nursery (Stop (SomeBranch child)))
     -- It is being stopped with the rest, or has ended.
     _ -> pure ()
