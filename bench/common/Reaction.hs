@@ -3,8 +3,8 @@
 -- to the first step of the recovery.
 module Reaction
   ( -- * The reaction
-    Stage (..)
-  , newStage
+    Probe (..)
+  , newProbe
   , reactor
   , reaction
 
@@ -28,7 +28,7 @@ import qualified Behavior.Signal as Signal
 import Measured
 
 -- | What a reaction uses.
-data Stage = Stage
+data Probe = Probe
   { flag :: TVar Bool
   -- ^ The condition.
   , ready :: MVar ()
@@ -37,20 +37,20 @@ data Stage = Stage
   -- ^ When the latest reaction took its first step.
   }
 
-newStage :: IO Stage
-newStage = Stage <$> newTVarIO False <*> newEmptyMVar <*> newIORef 0
+newProbe :: IO Probe
+newProbe = Probe <$> newTVarIO False <*> newEmptyMVar <*> newIORef 0
 
 -- | Interrupts a sleeping task.
-reactor :: Stage -> Behavior ()
-reactor stage = Signal.monitor (Signal.watching (readTVar (flag stage))) (reaction stage) task
+reactor :: Probe -> Behavior ()
+reactor probe = Signal.monitor (Signal.watching (readTVar (flag probe))) (reaction probe) task
  where
-  task = putMVar (ready stage) () >> sleep 3600
+  task = putMVar (ready probe) () >> sleep 3600
 
 -- | Stores the time first.
-reaction :: Stage -> IO ()
-reaction stage = do
-  time >>= writeIORef (reactedAt stage)
-  STM.atomically (writeTVar (flag stage) False)
+reaction :: Probe -> IO ()
+reaction probe = do
+  time >>= writeIORef (reactedAt probe)
+  STM.atomically (writeTVar (flag probe) False)
 
 -- | The time between a reaction and the next change: its name, and microseconds. In the longer
 -- ones the process is idle, and the processor may be.
@@ -64,18 +64,18 @@ gaps = [Gap "hot" 300, Gap "cold" 2000, Gap "colder" 5000]
 
 -- | Changes the condition repeatedly, each time after the gap, for the given number of seconds.
 -- The sorted times to the first step, in microseconds.
-reactionTimes :: Stage -> Gap -> Double -> IO [Double]
-reactionTimes stage gap seconds = do
-  takeMVar (ready stage)
+reactionTimes :: Probe -> Gap -> Double -> IO [Double]
+reactionTimes probe gap seconds = do
+  takeMVar (ready probe)
   _ <- during 0.2 sample
   sort <$> during seconds sample
  where
   sample = do
     _ <- usleep (gapTime gap)
     changed <- time
-    STM.atomically (writeTVar (flag stage) True)
-    takeMVar (ready stage)
-    reacted <- readIORef (reactedAt stage)
+    STM.atomically (writeTVar (flag probe) True)
+    takeMVar (ready probe)
+    reacted <- readIORef (reactedAt probe)
     pure ((reacted - changed) / 1000)
 
 -- | Repeats the action for the given number of seconds. The loop needs no stack, because the

@@ -50,9 +50,9 @@ main =
 
 measured :: String -> Situation -> Gap -> IO ()
 measured name start gap = do
-  stage <- newStage
+  probe <- newProbe
   times <- newEmptyMVar
-  start (reactor stage) (reactionTimes stage gap seconds >>= putMVar times)
+  start (reactor probe) (reactionTimes probe gap seconds >>= putMVar times)
   runtime <- setting
   takeMVar times >>= report ["plain", runtime, gapName gap] name [("p50", 0.5), ("p99", 0.99)]
  where

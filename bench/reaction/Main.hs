@@ -66,33 +66,33 @@ usage = die "usage: reaction (ours | \"by hand\" | bare) (hot | cold | colder) [
 
 -- | Exactly the same steps by hand: a thread waits for the change, stops the task, waits for its
 -- end, and starts another thread for the recovery.
-byHand :: Stage -> IO ()
-byHand stage = forever $ do
+byHand :: Probe -> IO ()
+byHand probe = forever $ do
   ended <- newEmptyMVar
   recovered <- newEmptyMVar
-  task <- forkIO ((putMVar (ready stage) () >> STM.atomically STM.retry) `finally` putMVar ended ())
-  STM.atomically (readTVar (flag stage) >>= check)
+  task <- forkIO ((putMVar (ready probe) () >> STM.atomically STM.retry) `finally` putMVar ended ())
+  STM.atomically (readTVar (flag probe) >>= check)
   killThread task
   takeMVar ended
-  _ <- forkIO (reaction stage >> putMVar recovered ())
+  _ <- forkIO (reaction probe >> putMVar recovered ())
   takeMVar recovered
 
 -- | The lower bound.
-bare :: Stage -> IO ()
-bare stage = forever $ do
-  putMVar (ready stage) ()
-  STM.atomically (readTVar (flag stage) >>= check)
-  reaction stage
+bare :: Probe -> IO ()
+bare probe = forever $ do
+  putMVar (ready probe) ()
+  STM.atomically (readTVar (flag probe) >>= check)
+  reaction probe
 
 -- | Changes the condition repeatedly. (With the longer gaps, there are too few changes for the
 -- last quantile.)
-measured :: String -> (Stage -> IO ()) -> Gap -> String -> IO ()
+measured :: String -> (Probe -> IO ()) -> Gap -> String -> IO ()
 measured variant reacts gap load = do
-  stage <- newStage
-  _ <- forkIO (reacts stage)
+  probe <- newProbe
+  _ <- forkIO (reacts probe)
   if gapName gap == "hot"
-    then reactionTimes stage gap 3 >>= report ["reaction", load] variant (shares ++ [("p99.9", 0.999)])
-    else reactionTimes stage gap 2.5 >>= report ["reaction", gapName gap, load] variant shares
+    then reactionTimes probe gap 3 >>= report ["reaction", load] variant (shares ++ [("p99.9", 0.999)])
+    else reactionTimes probe gap 2.5 >>= report ["reaction", gapName gap, load] variant shares
  where
   shares = [("p50", 0.5), ("p99", 0.99)]
 
