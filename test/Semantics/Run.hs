@@ -51,7 +51,6 @@ import Behavior.Internal.Signal.Source (watching)
 import qualified Behavior.Internal.Signal.Source as Library
 import Behavior.Sim
   ( StepKind (Note)
-  , Label (..)
   , SimOptions (endAt, scheduled, timerSlip, livelockLimit)
   , Plan (..)
   , Report (reportComplete)
