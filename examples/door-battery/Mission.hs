@@ -127,8 +127,7 @@ simulatedWithEvents o schedule' = do
     Returned m -> pure (report, Just m, events run)
     OutOfTime _ -> notOver report run
     Livelock _ _ -> notOver report run -- the hour would never pass
-    Faulting e -> throwIO e
-    Cancelled e -> throwIO e
+    Threw e -> throwIO e
     other -> throwIO (ErrorCall ("the simulation: " ++ explain other))
  where
   notOver report run = pure (report ++ [inWords NotOver], Nothing, events run)

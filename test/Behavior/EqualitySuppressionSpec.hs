@@ -20,8 +20,7 @@ import Behavior (Behavior, Seconds, both, sleep)
 import Behavior.Internal.Runtime (now)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (SimOptions (..), Outcome (OutOfTime, Returned), Run (..), defaultSimOptions, explain, simulateWith)
-import qualified Behavior.Sim as Sim
+import Behavior.Sim (SimOptions (..), Outcome (OutOfTime, Returned, Threw), Run (..), defaultSimOptions, explain, simulateWith)
 import Support
 import Watched
 
@@ -41,8 +40,7 @@ minute act = do
   shown = \case
     Returned _ -> "over"
     OutOfTime _ -> "goes on"
-    Sim.Failing e -> show e
-    Sim.Faulting e -> show e
+    Threw e -> show e
     other -> explain other
 
 -- | A sensor that reads the time, every second.

@@ -147,7 +147,6 @@ timedWith options act = do
     atomicModifyIORef' times (\ts -> (t : ts, length ts))
   end <- case outcome run of
     Returned a -> pure (Gave a)
-    Failing e -> pure (endingOf (Left e))
-    Faulting e -> pure (endingOf (Left e))
+    Threw e -> pure (endingOf (Left e))
     other -> fail (explain other)
   (,) end . reverse <$> readIORef times

@@ -18,7 +18,7 @@ import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Parallel
 import Behavior.STM (atomically, check, modifyTVar', newTVarIO, readTVar, writeTVar)
-import Behavior.Sim (Outcome (Failing, Faulting, Returned), Run (outcome), explain, explore, randomly)
+import Behavior.Sim (Outcome (Returned, Threw), Run (outcome), explain, explore, randomly)
 import Support
 
 spec :: Spec
@@ -153,8 +153,7 @@ spec = guarded $ do
   yielding n = replicateM_ (n `mod` 20) yield
   endOf = \case
     Returned a -> Gave a
-    Failing e -> endingOf (Left e)
-    Faulting e -> endingOf (Left e)
+    Threw e -> endingOf (Left e)
     other -> FaultedWith (explain other)
 
 children :: Spec

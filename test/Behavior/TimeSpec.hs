@@ -40,8 +40,7 @@ virtually :: Behavior a -> IO a
 virtually act =
   simulate act >>= \run -> case outcome run of
     Returned a -> pure a
-    Failing e -> throwIO e
-    Faulting e -> throwIO e
+    Threw e -> throwIO e
     other -> fail (explain other)
 
 infinite, notANumber :: Seconds

@@ -99,7 +99,7 @@ manySchedules = do
     for_ (quarters 24) $ \moment ->
       explored 5 calm {emergency = pressedAt moment, battery = [(0, 100), (3, 15)]} $ \world run -> do
         case outcome run of
-          Failing e | Just EmergencyStopped <- fromException e -> pure ()
+          Threw e | Just EmergencyStopped <- fromException e -> pure ()
           other -> expectationFailure (explain other)
         world `shouldRecord` safely <> stopped
   it "inspects each bed once, with interruptions at any time" $

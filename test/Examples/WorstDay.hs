@@ -8,6 +8,7 @@ module Examples.WorstDay
   , ended
   ) where
 
+import Control.Exception (fromException)
 import Control.Monad (unless, void)
 import Data.IORef (modifyIORef, newIORef, readIORef)
 import Data.List (isInfixOf)
@@ -47,6 +48,7 @@ inOneRun day = day simulate
 ended :: Run () -> String
 ended run = case outcome run of
   Returned () -> "returned"
-  Failing e -> "failure: " ++ show e
-  Faulting e -> "fault: " ++ show e
+  Threw e
+    | Just BehaviorFailed {} <- fromException e -> "failure: " ++ show e
+    | otherwise -> "fault: " ++ show e
   _ -> explain (outcome run)

@@ -152,9 +152,7 @@ observing instrument simulated world = do
       returnedWith = seen . Gave (ticks (finished run))
   fmap (\it -> (it, run)) . evaluated $ case outcome run of
     Sim.Returned value -> returnedWith (Succeeded value)
-    Sim.Failing e -> returnedWith (thrown e)
-    Sim.Faulting e -> returnedWith (thrown e)
-    Sim.Cancelled e -> returnedWith (thrown e)
+    Sim.Threw e -> returnedWith (thrown e)
     Sim.OutOfTime _ -> seen (Unknown (ticks (finished run)))
     Sim.Deadlock _ -> seen (Unknown (ticks (finished run)))
     Sim.Livelock labels _ -> Left ("livelock: " ++ show labels)

@@ -10,6 +10,7 @@ import System.IO.Error (isUserError)
 import Test.Hspec
 
 import Behavior
+import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime (Label (..), threadId, throwToAll, start, threadEnd)
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
@@ -46,9 +47,10 @@ runSimulated act = (\r -> (describedEnd (outcome r), finished r)) <$> simulate a
 describedEnd :: Show a => Outcome a -> String
 describedEnd end = case end of
   Returned a -> "returned " ++ show a
-  Failing e -> "failed " ++ show e
-  Faulting e -> "faulted " ++ show e
-  Cancelled e -> "cancelled " ++ show e
+  Threw e
+    | isFailure e -> "failed " ++ show e
+    | isCancellation e -> "cancelled " ++ show e
+    | otherwise -> "faulted " ++ show e
   Deadlock _ -> "deadlock"
   OutOfTime _ -> "out of time"
   _ -> "something else"

@@ -18,6 +18,7 @@ import qualified System.Timeout as System
 import Test.Hspec hiding (parallel)
 
 import Behavior
+import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime (annotate)
 import Behavior.Parallel (fork, scoped)
 import qualified Behavior.Signal as Signal
@@ -41,9 +42,10 @@ spec = guarded $ do
 ended :: Show a => Run a -> String
 ended run = case outcome run of
   Returned a -> "returned " ++ show a
-  Faulting e -> "faulted " ++ show e
-  Failing e -> "failed " ++ show e
-  Cancelled e -> "cancelled " ++ show e
+  Threw e
+    | isFailure e -> "failed " ++ show e
+    | isCancellation e -> "cancelled " ++ show e
+    | otherwise -> "faulted " ++ show e
   other -> explain other
 
 outcomes :: Spec

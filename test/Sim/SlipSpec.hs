@@ -61,7 +61,7 @@ spec = guarded . describe "Slip" $ do
         both
           (sleep 1 >> atomically (modifyTVar' parked (const True)))
           (sleep 1.05 >> readTVarIO parked >>= \is -> unless is failed)
-      traverse_ fail [explain (outcome run) | Failing _ <- [outcome run]]
+      traverse_ fail [explain (outcome run) | Threw _ <- [outcome run]]
     either (const "found") show found `shouldBe` "found"
 
 -- | Four branches that sleep; returns how late each wakes.

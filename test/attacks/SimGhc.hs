@@ -28,9 +28,7 @@ attack = forM_ programs $ \(name, fixed, program) -> do
   run = pure . either (\e -> "threw " ++ takeWhile (/= '\n') (show (e :: SomeException))) id
   explained r = case outcome r of
     Returned a -> Right a
-    Failing e -> Left e
-    Faulting e -> Left e
-    Cancelled e -> Left e
+    Threw e -> Left e
     other -> Right (explain other)
 
 -- | Each with whether GHC fixes the outcome.

@@ -25,9 +25,7 @@ attack = forM_ programs $ \(name, program) -> do
   run = pure . either (\e -> "threw " ++ takeWhile (/= '\n') (show (e :: SomeException))) id
   explained r = case outcome r of
     Returned a -> Right a
-    Failing e -> Left e
-    Faulting e -> Left e
-    Cancelled e -> Left e
+    Threw e -> Left e
     other -> Right (explain other)
 
 programs :: [(String, IO String)]

@@ -18,6 +18,7 @@ import Control.Exception (ErrorCall (..), SomeException (..), displayException, 
 import Data.List (groupBy, intercalate, isInfixOf)
 import Numeric (showFFloat)
 
+import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime.Backend (Label)
 import Behavior.Internal.SafeText
 import Behavior.Internal.Seconds (Seconds (..))
@@ -41,9 +42,10 @@ import Behavior.Internal.Sim.Types
 explain :: Outcome a -> String
 explain = \case
   Returned _ -> "it returned"
-  Failing e -> "it failed: " ++ text e
-  Faulting e -> "it faulted: " ++ text e
-  Cancelled e -> "it was cancelled: " ++ text e
+  Threw e
+    | isFailure e -> "it failed: " ++ text e
+    | isCancellation e -> "it was cancelled: " ++ text e
+    | otherwise -> "it faulted: " ++ text e
   Deadlock waiting -> listed "deadlock: every thread waits, and nothing in the simulation will wake one" waiting
   Livelock labels circles ->
     intercalate "\n  " $

@@ -21,7 +21,7 @@ import Data.Maybe (isJust)
 import Data.Void (Void, absurd)
 import System.IO.Unsafe (unsafePerformIO)
 
-import Behavior.Internal.Failure (Behavior, isCancellation, isFailure)
+import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Runtime.Backend
 import Behavior.Internal.Runtime.Dispatch
 import Behavior.Internal.Runtime.Property (Property)
@@ -153,10 +153,7 @@ outcomeOf cutOff end rest = case (cutOff, rest, end) of
     ScheduleMismatch
       ("the run ended before point " ++ show p ++ ", at which thread " ++ show thread ++ " was to run")
   (Nothing, [], Just (Right a)) -> Returned a
-  (Nothing, [], Just (Left e))
-    | isFailure e -> Failing e
-    | isCancellation e -> Cancelled e
-    | otherwise -> Faulting e
+  (Nothing, [], Just (Left e)) -> Threw e
   (Nothing, [], Nothing) -> ScheduleMismatch "unreachable"
 
 -- | Ends all tasks, the youngest first, one at a time.

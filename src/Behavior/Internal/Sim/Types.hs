@@ -106,12 +106,8 @@ data Run a = Run
 data Outcome a
   = -- | The behaviour returned.
     Returned a
-  | -- | It failed.
-    Failing SomeException
-  | -- | It threw any other exception that is not a cancellation.
-    Faulting SomeException
-  | -- | It threw a cancellation that no other thread had thrown to it.
-    Cancelled SomeException
+  | -- | It threw this: a failure, a fault, or a cancellation that no other thread had thrown to it.
+    Threw SomeException
   | -- | All threads wait, and nothing in the simulation will wake one.
     Deadlock [Waiting]
   | -- | The virtual time did not advance for more than 'livelockLimit' scheduling points; the
