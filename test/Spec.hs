@@ -64,6 +64,7 @@ import qualified Sim.DeliverySpec
 import qualified Sim.EndSpec
 import qualified Sim.ExploreSpec
 import qualified Sim.MockSpec
+import qualified Sim.PremiseSpec
 import qualified Sim.QuickCheckSpec
 import qualified Sim.RecordSpec
 import qualified Sim.SimulateSpec
@@ -129,6 +130,7 @@ main = hspec $ do
     Sim.ClaimSpec.spec
     Sim.MockSpec.spec
     Sim.VacuousSpec.spec
+    Sim.PremiseSpec.spec
     Sim.QuickCheckSpec.spec
   describe "Traces" $ do
     Trace.TraceSpec.spec

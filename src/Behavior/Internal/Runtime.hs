@@ -40,6 +40,7 @@ module Behavior.Internal.Runtime
   , Property
   , currentProperty
   , keepMistake
+  , keepPremises
   ) where
 
 import Control.Concurrent (getNumCapabilities, yield)

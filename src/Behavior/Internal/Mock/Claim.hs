@@ -17,6 +17,7 @@ module Behavior.Internal.Mock.Claim
     -- * Checking
   , holds
   , verdict
+  , premisesIn
   ) where
 
 import Control.Applicative ((<|>))
@@ -29,6 +30,7 @@ import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime (Seconds)
+import Behavior.Internal.SafeText (settledText)
 
 -- $setup
 -- >>> import Data.List (sortOn)
@@ -54,6 +56,8 @@ import Behavior.Internal.Runtime (Seconds)
 data Claim = Claim
   { claimWords :: String
   , claimNeeds :: [Need]
+  , premises :: [Premise]
+  -- ^ What has to come, or it holds whatever happens.
   , violation :: Record -> Origin -> Maybe Violation
   -- ^ How it does not hold for the entries after the origin, if so.
   }
@@ -67,17 +71,17 @@ data Violation = Violation
   -- ^ The lines that show it.
   }
 
--- | The entry after which a claim is checked, and its time. (For the whole record the
--- entry is -1.)
-data Origin = Origin Int Seconds
-
 instance Semigroup Claim where
   a <> b =
-    Claim (intercalate ", and " (filter (not . null) [claimWords a, claimWords b])) (claimNeeds a ++ claimNeeds b) $
-      \record origin -> violation a record origin <|> violation b record origin
+    Claim
+      { claimWords = intercalate ", and " (filter (not . null) [claimWords a, claimWords b])
+      , claimNeeds = claimNeeds a ++ claimNeeds b
+      , premises = premises a ++ premises b
+      , violation = \record origin -> violation a record origin <|> violation b record origin
+      }
 
 instance Monoid Claim where
-  mempty = Claim "" [] (\_ _ -> Nothing)
+  mempty = Claim "" [] [] (\_ _ -> Nothing)
 
 -- | It happens, at least once.
 --
@@ -124,17 +128,20 @@ withinSeconds limit m
 --
 -- @since 0.1.0.0
 never :: Moment -> Claim
-never m = claimOf ("never " ++ momentWords m) m $ \_ _ found -> case found of
-  [] -> Nothing
-  row : _ -> Just ("it was so at " ++ inSeconds (time row), [row])
+never m = (claimOf ("never " ++ momentWords m) m check) {premises = momentPremises m}
+ where
+  check _ _ found = case found of
+    [] -> Nothing
+    row : _ -> Just ("it was so at " ++ inSeconds (time row), [row])
 
 -- | It happens exactly the given number of times.
 --
 -- @since 0.1.0.0
 exactly :: Int -> Moment -> Claim
-exactly n m = claimOf ("exactly " ++ times n ++ " " ++ momentWords m) m $ \_ _ found ->
-  if length found == n then Nothing else Just ("it was so " ++ times (length found), found)
+exactly n m =
+  (claimOf ("exactly " ++ times n ++ " " ++ momentWords m) m check) {premises = if n == 0 then momentPremises m else []}
  where
+  check _ _ found = if length found == n then Nothing else Just ("it was so " ++ times (length found), found)
   times 1 = "once"
   times many = show many ++ " times"
 
@@ -182,7 +189,9 @@ always s = simple ("always " ++ intervalWords s) (intervalNeeds s) $ \record (Or
 -- @since 0.1.0.0
 comesBefore :: Moment -> Moment -> Claim
 comesBefore a b =
-  simple (momentWords a ++ " before " ++ momentWords b) (momentNeeds a ++ momentNeeds b) $ \record (Origin origin _) ->
+  (simple (momentWords a ++ " before " ++ momentWords b) (momentNeeds a ++ momentNeeds b) check) {premises = [premiseOf b]}
+ where
+  check record (Origin origin _) =
     let after m = filter ((> origin) . fst) (occurrences m record)
      in case (after a, after b) of
           (_, []) -> Nothing
@@ -200,20 +209,27 @@ infix 7 `comesBefore`
 -- @since 0.1.0.0
 whenever :: Moment -> Claim -> Claim
 whenever m claim =
-  Claim (words' (claimWords claim)) (momentNeeds m ++ claimNeeds claim) $ \record (Origin origin _) ->
-    listToMaybe
-      [ Violation (words' (broken v)) ("from " ++ inSeconds (time row) ++ " on, " ++ reason v) (row : shown v)
-      | row@(n, _) <- occurrences m record
-      , n > origin
-      , Just v <- [violation claim record (Origin n (time row))]
-      ]
+  Claim
+    { claimWords = words' (claimWords claim)
+    , claimNeeds = momentNeeds m ++ claimNeeds claim
+    , premises = premiseOf m : map later (premises claim)
+    , violation = \record origin ->
+        listToMaybe
+          [ Violation (words' (broken v)) ("from " ++ inSeconds (time row) ++ " on, " ++ reason v) (row : shown v)
+          | (row, here) <- after record origin
+          , Just v <- [violation claim record here]
+          ]
+    }
  where
+  after record (Origin origin _) = [(row, Origin n (time row)) | row@(n, _) <- occurrences m record, n > origin]
+  later (Premise words'' comes') =
+    Premise (words'' ++ " after " ++ momentWords m) (\record -> any (comes' record . snd) . after record)
   words' then' = "whenever " ++ momentWords m ++ ", " ++ then'
 
 -- | A claim that is not made of others: its words, what it needs, and why it does not hold, with the
 -- lines that show it.
 simple :: String -> [Need] -> (Record -> Origin -> Maybe (String, [Line])) -> Claim
-simple words' needs check = Claim words' needs (\record origin -> uncurry (Violation words') <$> check record origin)
+simple words' needs check = Claim words' needs [] (\record origin -> uncurry (Violation words') <$> check record origin)
 
 -- | A claim about when a moment occurs.
 claimOf :: String -> Moment -> (Record -> Origin -> [Line] -> Maybe (String, [Line])) -> Claim
@@ -251,6 +267,10 @@ verdict claim record = case unfit (recordSubjects record) (claimNeeds claim) of
   entries = recordEntries record
   refuted which why rows = Left (unlines (("This does not hold: " ++ which ++ ".") : why : rows))
   capital why = map toUpper (take 1 why) ++ drop 1 why
+
+-- | What has to come, or the claim holds whatever happens: in words, and whether it has come in this record.
+premisesIn :: Record -> Claim -> [(String, Bool)]
+premisesIn record claim = [(settledText (premiseWords p), comes p record (Origin (-1) 0)) | p <- premises claim]
 
 -- | The given lines, marked, each with the two before and after it; if none are given,
 -- the last lines.

@@ -33,6 +33,11 @@ module Behavior.Internal.Mock.Moment
   , shortlyAfter
   , Range (..)
 
+    -- * Premises
+  , Premise (..)
+  , Origin (..)
+  , premiseOf
+
     -- * Places
   , Place (..)
   , Side (..)
@@ -74,6 +79,8 @@ time = entryTime . snd
 data Moment = Moment
   { momentWords :: String
   , momentNeeds :: [Need]
+  , momentPremises :: [Premise]
+  -- ^ What has to come, or there can be none.
   , occurrences :: Record -> [Line]
   -- ^ In order.
   }
@@ -143,6 +150,7 @@ momentOf kinds verb isIt name =
   Moment
     { momentWords = show name ++ " " ++ verb
     , momentNeeds = [Need name verb kinds]
+    , momentPremises = []
     , occurrences = filter (\(_, entry) -> entry `isAbout` name && isIt (entryKind entry)) . numbered
     }
 
@@ -168,6 +176,7 @@ anyOf ms =
   Moment
     { momentWords = intercalate " or " (map momentWords ms)
     , momentNeeds = concatMap momentNeeds ms
+    , momentPremises = concatMap momentPremises ms
     , occurrences = \record -> foldr (merged . (`occurrences` record)) [] ms
     }
 
@@ -194,7 +203,7 @@ merged xs ys = xs ++ ys
 --
 -- @since 0.1.0.0
 during :: Moment -> Interval -> Moment
-during = restricted "while" id
+during m s = (restricted "while" id m s) {momentPremises = ofInterval s : momentPremises m}
 
 -- | Those that do not happen inside an interval.
 --
@@ -210,6 +219,7 @@ restricted word wanted m s =
   Moment
     { momentWords = momentWords m ++ " " ++ word ++ " " ++ intervalWords s
     , momentNeeds = momentNeeds m ++ intervalNeeds s
+    , momentPremises = momentPremises m
     , occurrences = \record ->
         let ranges = intervalRanges s record
          in filter (\row -> wanted (any (isInside (at row)) ranges)) (occurrences m record)
@@ -225,11 +235,17 @@ restricted word wanted m s =
 -- @since 0.1.0.0
 overlapping :: Interval -> Interval -> Moment
 overlapping a b =
-  Moment (intervalWords a ++ " while " ++ intervalWords b) (intervalNeeds a ++ intervalNeeds b) $ \record ->
-    let as = intervalRanges a record
-        bs = intervalRanges b record
-        these `startsIn` others = [start this | this <- these, any (isInside (from this)) others]
-     in merged (as `startsIn` bs) (bs `startsIn` as)
+  Moment
+    { momentWords = intervalWords a ++ " while " ++ intervalWords b
+    , momentNeeds = intervalNeeds a ++ intervalNeeds b
+    , momentPremises = [ofInterval a, ofInterval b]
+    , occurrences = \record ->
+        let as = intervalRanges a record
+            bs = intervalRanges b record
+         in merged (as `startsIn` bs) (bs `startsIn` as)
+    }
+ where
+  these `startsIn` others = [start this | this <- these, any (isInside (from this)) others]
 
 infixl 8 `during`, `outside`, `overlapping`
 
@@ -386,6 +402,26 @@ shortlyAfter seconds m =
         , let t = entryTime entry
         ]
     }
+
+-- | What has to come, or a claim holds whatever happens.
+data Premise = Premise
+  { premiseWords :: String
+  , comes :: Record -> Origin -> Bool
+  -- ^ Whether it comes after the origin.
+  }
+
+-- | The entry after which a claim is checked, and its time. (For the whole record the
+-- entry is -1.)
+data Origin = Origin Int Seconds
+
+-- | The moment comes.
+premiseOf :: Moment -> Premise
+premiseOf m = Premise (momentWords m) $ \record (Origin origin _) -> any ((> origin) . fst) (occurrences m record)
+
+-- | The interval is going on.
+ofInterval :: Interval -> Premise
+ofInterval s = Premise (intervalWords s) $ \record (Origin origin since) ->
+  any ((> Place since At origin) . to) (intervalRanges s record)
 
 -- | Times that differ by less are the same: for example a sum and the time of a timer.
 tolerance :: Seconds

@@ -36,7 +36,7 @@ import Data.IORef
 import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Mock.Claim (Claim, verdict)
+import Behavior.Internal.Mock.Claim (Claim, premisesIn, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime
@@ -109,7 +109,7 @@ clock mock = do
   t <- now
   here <- simulatedRun
   goesOn <- isRecorded
-  property <- (<|> madeIn mock) <$> currentProperty
+  property <- ownProperty mock
   -- Neither starts the clock: what is unwound after the end of a run, and what is outside of the simulation
   -- that a property runs.
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
@@ -126,6 +126,10 @@ clock mock = do
     Just own | ownRun own /= ownRun first -> refuse (belongsTo own first)
     _ -> pure ()
   pure (maybe t startTime begun, t)
+
+-- | The property of an exploration that uses this world.
+ownProperty :: Mock -> IO (Maybe Property)
+ownProperty mock = (<|> madeIn mock) <$> currentProperty
 
 -- | A property of an exploration uses a world outside of its simulation.
 outsideOfSimulation :: String
@@ -223,6 +227,9 @@ happened mock = do
 -- | Throws a 'BrokenClaim' with the reason, unless the claim holds for the record. Use it
 -- like an expectation of hspec.
 --
+-- In an exploration it is also kept whether that has come without which the claim holds whatever happens
+-- ('Behavior.Sim.reportNeverCame').
+--
 -- >>> begin mock
 -- >>> mock `shouldRecord` eventually (noted "all is well")
 -- *** Exception: This does not hold: eventually "all is well" is noted.
@@ -234,6 +241,8 @@ shouldRecord :: Mock -> Claim -> IO ()
 shouldRecord mock claim = do
   record <- happened mock
   either (throwIO . BrokenClaim) pure (verdict claim record)
+  property <- ownProperty mock
+  for_ property (`keepPremises` premisesIn record claim)
 
 infix 1 `shouldRecord`
 

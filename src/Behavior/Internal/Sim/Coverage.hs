@@ -1,7 +1,8 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What the runs of an exploration have started, and what they have not.
+-- What the runs of an exploration have started, and what they have not; and what never came, of that which claims
+-- about them presuppose.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Coverage
@@ -17,6 +18,7 @@ module Behavior.Internal.Sim.Coverage
   , withRun
   , started
   , neverStarted
+  , neverCame
   ) where
 
 import Data.IntMap.Strict (IntMap)
@@ -80,43 +82,55 @@ placeOf operator here = case here of
         (n, names)
   _ -> (0, [])
 
--- | The names of what was started; and of what can be, whether it was, by the names around it, the outermost
--- first.
-data Coverage = Coverage !(Set String) !(Map [String] Operators)
+-- | What many runs have reached.
+data Coverage = Coverage
+  { known :: !(Set String)
+  -- ^ The names of what was started.
+  , could :: !(Map [String] Operators)
+  -- ^ Of what could be started, whether it was, by the names around it, the outermost first.
+  , came :: !(Map String Bool)
+  -- ^ Of what claims presuppose, whether it came.
+  }
 
 -- | That of no run.
 nothing :: Coverage
-nothing = Coverage Set.empty Map.empty
+nothing = Coverage Set.empty Map.empty Map.empty
 
 -- | With that of a further run.
-withRun :: [Event] -> Reached -> Coverage -> Coverage
-withRun happened reached (Coverage known could) =
+withRun :: [Event] -> Reached -> Map String Bool -> Coverage -> Coverage
+withRun happened reached premises before =
   Coverage
-    (foldl' add known [spanName s | Began s <- happened, spanKind s /= Operator])
-    (foldl' join could reached)
+    { known = foldl' add (known before) [spanName s | Began s <- happened, spanKind s /= Operator]
+    , could = foldl' join (could before) reached
+    , came = Map.unionWith (||) (came before) premises
+    }
  where
   -- A name is evaluated, so that it does not keep its run in memory.
   add names name
     | Set.member name names = names
     | otherwise = Set.insert (settledText name) names
   -- (A behaviour that runs itself inside of itself is one.)
-  join before (Inner names inside) =
+  join all' (Inner names inside) =
     let outside = map head (group (reverse (map (take 100 . settledText) names)))
-        old = Map.findWithDefault Map.empty outside before
+        old = Map.findWithDefault Map.empty outside all'
      in if Map.isSubmapOfBy (Map.isSubmapOfBy (<=)) inside old
-          then before
-          else Map.insert outside (Map.unionWith (Map.unionWith (||)) old inside) before
+          then all'
+          else Map.insert outside (Map.unionWith (Map.unionWith (||)) old inside) all'
 
 -- | The names of all that was started: behaviours that have a name, scripted actions, and branches.
 started :: Coverage -> [String]
-started (Coverage known _) = Set.toAscList known
+started = Set.toAscList . known
 
 -- | The names of what no run has started: scripted actions, with no argument if they have one; and branches,
 -- with the names around them.
 neverStarted :: Coverage -> [String]
-neverStarted (Coverage _ could) =
+neverStarted covered =
   [ show (if null operator then Label name "" else Label operator name) ++ inPath (reverse names)
-  | (names, inside) <- Map.toList could
+  | (names, inside) <- Map.toList (could covered)
   , (operator, branches) <- Map.toList inside
   , (name, False) <- Map.toList branches
   ]
+
+-- | What has come in no run, of that which claims presuppose.
+neverCame :: Coverage -> [String]
+neverCame covered = [what | (what, False) <- Map.toList (came covered)]

@@ -14,6 +14,8 @@ module Behavior.Internal.Sim.Explore
 import Control.Exception hiding (Deadlock)
 import Data.Foldable (toList, traverse_)
 import Data.IORef
+import Data.Map.Strict (Map)
+import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
 import qualified Data.Sequence as Seq
 
@@ -53,16 +55,40 @@ data Trial = Trial
   , size :: Int
   , reached :: Reached
   -- ^ What it could start, and has.
+  , claimed :: Map String Bool
+  -- ^ What its claims presuppose, and whether it came.
   }
 
--- | The runs so far: how many, their scheduling points in all, and what they have started.
+-- | A trial that has not run anything.
+noTrial :: Trial
+noTrial =
+  Trial
+    { thrown = Nothing
+    , deviations = []
+    , happened = []
+    , traceOfRun = []
+    , size = 0
+    , reached = nothingYet
+    , claimed = Map.empty
+    }
+
+-- | The runs so far: how many, their scheduling points in all, and what they have reached.
 data Tally = Tally !Int !Int !Coverage
 
 counting :: Tally -> Trial -> Tally
-counting (Tally n total covered) t = Tally (n + 1) (total + size t) (withRun (traceOfRun t) (reached t) covered)
+counting (Tally n total covered) t =
+  Tally (n + 1) (total + size t) (withRun (traceOfRun t) (reached t) (claimed t) covered)
 
 reported :: Bool -> Tally -> Report
-reported all' (Tally n total covered) = Report n all' total (started covered) (neverStarted covered)
+reported all' (Tally n total covered) =
+  Report
+    { reportSchedules = n
+    , reportComplete = all'
+    , reportPoints = total
+    , reportStarted = started covered
+    , reportNeverStarted = neverStarted covered
+    , reportNeverCame = neverCame covered
+    }
 
 -- | Runs a property under many schedules, until one fails.
 --
@@ -232,8 +258,14 @@ tryRun o choosing property = testing $ \this -> do
             let deviating = case runSchedule run of
                   Preempting s -> s
                   _ -> []
-            writeIORef made . Just $ \thrown' ->
-              Trial thrown' deviating (steps run) (events run) (runPoints run) startable
+            writeIORef made . Just $
+              noTrial
+                { deviations = deviating
+                , happened = steps run
+                , traceOfRun = events run
+                , size = runPoints run
+                , reached = startable
+                }
             case outcome run of
               BlockedOutside _ _ -> improper run
               ExternalWakeup _ -> improper run
@@ -245,11 +277,12 @@ tryRun o choosing property = testing $ \this -> do
       throwMistake = mistakeOf this >>= mapM_ throwIO
   end <- try ((property simulating >>= evaluate) <* throwMistake)
   trial <- readIORef made
+  presupposed <- premisesOf this
   case (end, trial) of
-    (Right (), Just simulated) -> pure (simulated Nothing)
+    (Right (), Just simulated) -> pure simulated {claimed = presupposed}
     (Right (), Nothing) -> throwIO . ErrorCall $
       "explore: the property has simulated nothing, so it shows nothing: \
       \it is given a function, and has to simulate with it"
     (Left e, _)
       | isCancellation e -> throwIO e
-      | otherwise -> pure (fromMaybe (\thrown' -> Trial thrown' [] [] [] 0 nothingYet) trial (Just e))
+      | otherwise -> pure (fromMaybe noTrial trial) {thrown = Just e}

@@ -103,7 +103,7 @@ replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 endingAt :: Plan -> Seconds -> Plan
 endingAt whole end = whole {planOptions = (planOptions whole) {endAt = end}}
 
--- | What was explored. Its text has the numbers, and what no schedule has started.
+-- | What was explored. Its text has the numbers, and what no schedule has started, or has brought about.
 --
 -- @since 0.1.0.0
 data Report = Report
@@ -124,6 +124,11 @@ data Report = Report
   -- ('Behavior.Trace.named'), as in @"teleoReactive: rule 2 (mission > way home)"@: operators of the same kind
   -- with the same names around them count as one. (The branches of 'Behavior.Signal.switch' are not known
   -- before; an alternative of '?' is no branch: name it, and require it in 'reportStarted'.)
+  , reportNeverCame :: [String]
+  -- ^ What came under no schedule, although a claim of 'Behavior.Sim.Mock.shouldRecord' holds whatever happens
+  -- without it: what triggers a 'Behavior.Sim.Mock.whenever', what is second in a
+  -- 'Behavior.Sim.Mock.comesBefore', and the intervals of a 'Behavior.Sim.Mock.never' with
+  -- 'Behavior.Sim.Mock.during' or 'Behavior.Sim.Mock.overlapping'.
   }
   deriving (Eq)
 
@@ -131,10 +136,11 @@ instance Show Report where
   show r =
     counted "schedule" (reportSchedules r) ++ " of " ++ counted "point" (reportPoints r) ++ " in all"
       ++ (if reportComplete r then "" else ", and there are more")
-      ++ (if null (reportNeverStarted r) then "" else "; never started: " ++ neverStarted)
+      ++ listed "; never started: " (map show (reportNeverStarted r))
+      ++ listed "; never came: " (reportNeverCame r)
    where
     counted what n = show n ++ " " ++ what ++ (if n == 1 then "" else "s")
-    neverStarted = intercalate ", " (map show (reportNeverStarted r))
+    listed title those = if null those then "" else title ++ intercalate ", " those
 
 -- | A schedule under which the property does not hold.
 --
