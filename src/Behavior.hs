@@ -19,24 +19,25 @@
 -- == What every operator promises
 --
 -- 1. /Structured./ When an operator returns or throws, every behaviour that it started has
---    ended, cleanup included, even if the caller was interrupted twice meanwhile.
---    (So a slow cleanup makes the caller wait.)
+--    ended, cleanup included. No behaviour is orphaned, even if the caller is interrupted twice
+--    meanwhile. (So a slow cleanup makes the caller wait.)
 -- 2. /Never both./ 'rSelect' and 'monitor' start a branch only after the previous one,
 --    cleanup included, has ended.
 -- 3. /No lost work./ If an operator's own branch returns although its stop was requested, it
 --    has completed: its result stands, and that operator does not run it again. (If an outer
 --    operator interrupts this one after the branch has completed, and before this operator
---    has returned, the result is lost: see below.)
+--    has returned, the result is lost.)
 -- 4. /No lost fault./ A fault of a branch, also one thrown while the branch is being
---    stopped, always reaches the caller (of several, the leftmost).
--- 5. /Interruptible./ What runs in its own thread (every branch, and the recovery of
---    'monitor') runs unmasked, whatever the caller's masking state. '?', 'attempt' and
+--    stopped, always reaches the caller. (Of several, the leftmost.)
+-- 5. /Interruptible./ What runs in a thread of its own runs unmasked, whatever the caller's
+--    masking state. (That is every branch, and the recovery of 'monitor'.) '?', 'attempt' and
 --    'fallbackOver' keep the caller's masking state.
 -- 6. /Together./ An operator first requests the stop of everything that has to stop, and
 --    then waits.
 -- 7. /Constant space./ A million reselections, recoveries, retries or alternatives
 --    (nested to the right) run in constant memory.
--- 8. /Labelled./ Every thread is labelled with its operator and branch.
+-- 8. /Labelled./ Every thread is labelled with its operator and branch. (Before GHC 9.6, where
+--    only an event log shows labels, only while one is written.)
 -- 9. /A dead sensor is never \"false\"./ A condition that fails, faults or no longer has a
 --    value ends its operator with a failure or fault, after the branch has stopped.
 -- 10. /Nothing spins./ An operator that waits uses no processor time. Readings of one
