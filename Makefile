@@ -1,5 +1,5 @@
 .PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak \
-  signals reality attacks mutants ci clean
+  signals reality attacks mutants release ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -10,7 +10,7 @@ help:
 	@echo 'make warnings  build everything with warnings as errors'
 	@echo 'make doctest   run the examples in the documentation'
 	@echo 'make readme    run the program in README.md'
-	@echo 'make lint      hlint, wrong phrases, and whether the mutants fit the sources'
+	@echo 'make lint      hlint, format, phrases, links, and whether mutants and pages fit the sources'
 	@echo 'make docs      build the documentation, which must cover every export'
 	@echo 'make check     check the package with cabal check'
 	@echo 'make matrix    demo and test in clean Debian systems (SUITES="bookworm" selects one)'
@@ -22,6 +22,7 @@ help:
 	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
 	@echo 'make attacks   programs that try to break the promises (NAMES="Storm" selects)'
 	@echo 'make mutants   small mistakes in the sources, which the tests must detect (NAMES="debounce" selects)'
+	@echo 'make release   the archives of a release, tried in a clean folder (uploads nothing)'
 	@echo 'make clean     remove what was built'
 
 demo:
@@ -35,7 +36,7 @@ endif
 test:
 	@.ci/test $(ARGS)
 
-programs skeleton warnings doctest readme lint docs check:
+programs skeleton warnings doctest readme lint docs check release:
 	@.ci/$@
 
 matrix:
