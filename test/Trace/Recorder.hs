@@ -9,8 +9,8 @@
 module Trace.Recorder
   ( Record (..)
   , Entry (..)
-  , Position (..)
-  , How (..)
+  , Owner (..)
+  , PartEnd (..)
   , recordedRun
   , nameOf
   , isStop
@@ -43,25 +43,25 @@ data Record = Record
 -- | Parts and operators are numbered together. Each entry has its thread.
 data Entry
   = -- | A part, and whether it has a name.
-    Entered String Int Position Program Bool
-  | HasLeft String Int How
+    Entered String Int Owner Program Bool
+  | HasLeft String Int PartEnd
   | -- | The operator at the top of a part.
-    Operates String Int Position Program
-  | HasOperated String Int How
+    Operates String Int Owner Program
+  | HasOperated String Int PartEnd
   | IsSet Condition Level
   | -- | An event, received where only named spans count ('False'), or all ('True').
     Received Bool String Event
   deriving (Show)
 
--- | Where a part is: in the named part, or in the operator, with this number; and in which branch.
-data Position = Position
-  { owner :: Maybe Int
-  , via :: Maybe String
+-- | In what a part is: in the named part, or in the operator, with this number; and in which branch.
+data Owner = Owner
+  { ownerNumber :: Maybe Int
+  , ownerBranch :: Maybe String
   }
   deriving (Eq, Show)
 
 -- | How a part ended.
-data How = Returns | Fails' String | Faults' String | IsStopped
+data PartEnd = PartReturned | PartFailed String | PartFaulted String | PartStopped
   deriving (Eq, Show)
 
 -- | The name of the part with this number.
@@ -78,7 +78,7 @@ recordedRun around salt how w = do
       self = show <$> myThreadId
       part = atomicModifyIORef' lastPart (\n -> (n + 1, n + 1))
       -- A part, or an operator.
-      noting :: IO () -> (How -> IO ()) -> Behavior a -> Behavior a
+      noting :: IO () -> (PartEnd -> IO ()) -> Behavior a -> Behavior a
       noting entered left act = do
         entered
         -- Masked, so that a pending stop request does not replace a fault.
@@ -90,14 +90,14 @@ recordedRun around salt how w = do
         n <- part
         thread <- self
         noting (write (Entered thread n here p isNamed)) (write . HasLeft thread n) $
-          if isNamed then named (nameOf n) (act (Position (Just n) Nothing)) else act here
+          if isNamed then named (nameOf n) (act (Owner (Just n) Nothing)) else act here
       operating here p run = case operatorName p of
         Nothing -> run here here
         Just _ -> do
           n <- part
           thread <- self
           noting (write (Operates thread n here p)) (write . HasOperated thread n) $
-            run here (Position (Just n) Nothing)
+            run here (Owner (Just n) Nothing)
       chance p = do
         n <- readIORef lastPart
         pure (scrambled (salt * 7919 + n) `mod` 8 < (case p of Do _ _ -> 6; _ -> 3))
@@ -109,8 +109,8 @@ recordedRun around salt how w = do
           }
       instrument =
         Instrument
-          { root = Position Nothing Nothing
-          , inBranch = \label here -> here {via = Just label}
+          { root = Owner Nothing Nothing
+          , inBranch = \label here -> here {ownerBranch = Just label}
           , aroundAll = \act -> mask $ \restore ->
               myPlace >>= \case
                 Nothing -> restore (around act)
@@ -134,14 +134,14 @@ recordedRun around salt how w = do
     entry : later -> entry : ofRun count later
     [] -> []
 
-howOf :: Either SomeException a -> How
+howOf :: Either SomeException a -> PartEnd
 howOf = \case
-  Right _ -> Returns
+  Right _ -> PartReturned
   Left e
-    | Just (BehaviorFailed _ failure) <- fromException e -> Fails' (displayException failure)
-    | Just (StoppedWithFault _ fault) <- fromException e -> Faults' (text fault)
-    | isCancellation e -> IsStopped
-    | otherwise -> Faults' (text e)
+    | Just (BehaviorFailed _ failure) <- fromException e -> PartFailed (displayException failure)
+    | Just (StoppedWithFault _ fault) <- fromException e -> PartFaulted (text fault)
+    | isCancellation e -> PartStopped
+    | otherwise -> PartFaulted (text e)
  where
   -- (Of the exception alone: newer versions of GHC add where it was thrown.)
   text :: SomeException -> String
@@ -149,8 +149,8 @@ howOf = \case
 
 -- | Whether the part was stopped; the exceptions that are thrown to a plain thread may have a
 -- synchronous type.
-isStop :: How -> Bool
-isStop = (`elem` [IsStopped, Faults' "EnoughOfThis"])
+isStop :: PartEnd -> Bool
+isStop = (`elem` [PartStopped, PartFaulted "EnoughOfThis"])
 
 -- | A number that looks random.
 scrambled :: Int -> Int

@@ -50,7 +50,7 @@ data Indexed = Indexed
   -- ^ The branch that runs in a thread.
   , spanOf :: Map Int Int
   -- ^ By the number of a part with a name, or of an operator: its span.
-  , partOf :: Map Int (Position, Program)
+  , partOf :: Map Int (Owner, Program)
   -- ^ By the number of a span.
   }
 
@@ -209,7 +209,7 @@ parents x =
        , Just (p, True) <- [Map.lookup n named']
        ]
     ++ [ "no span of an operator: " ++ show (n, p)
-       | (_, HasOperated _ n Returns) <- es
+       | (_, HasOperated _ n PartReturned) <- es
        , n `Map.notMember` spanOf x
        , Just p <- [Map.lookup n operators]
        , not (isDecide p)
@@ -219,16 +219,16 @@ parents x =
   named' = Map.fromList [(n, (p, isNamed)) | (_, Entered _ n _ p isNamed) <- es]
   operators = Map.fromList [(n, p) | (_, Operates _ n _ p) <- es]
   isDecide = \case Decide {} -> True; _ -> False
-  fits here thread parent = case via here of
-    Nothing -> parent == ownerOf here && (isNothing (owner here) || ownerThread here == Just thread)
+  fits here thread parent = case ownerBranch here of
+    Nothing -> parent == ownerOf here && (isNothing (ownerNumber here) || ownerThread here == Just thread)
     Just label -> case parent of
       Inside b
         | Just (_, thread', s) <- Map.lookup b (begun x) ->
             spanKind s == Branch && spanName s == label && spanParent s == ownerOf here && thread == thread'
       _ -> False
   ownerThread here = (\(_, thread, _) -> thread) <$> ownerSpan here
-  ownerSpan here = owner here >>= (`Map.lookup` spanOf x) >>= (`Map.lookup` begun x)
-  ownerOf here = case owner here of
+  ownerSpan here = ownerNumber here >>= (`Map.lookup` spanOf x) >>= (`Map.lookup` begun x)
+  ownerOf here = case ownerNumber here of
     Nothing -> Top
     Just n -> maybe UnknownParent Inside (Map.lookup n (spanOf x))
 
@@ -243,13 +243,13 @@ endings x =
   ]
     ++ [ "the end of " ++ show s ++ ": " ++ show end' ++ ", but its program: " ++ show how
        | (_, Entered thread n here _ _) <- es
-       , Just label <- [via here]
+       , Just label <- [ownerBranch here]
        , not (": polling" `isInfixOf` label)
        , isFirst thread n
        , Just s <- [Map.lookup thread (threadsBranch x)]
        , Just how <- [Map.lookup n leftBy]
        , Just (_, _, _, _, end') <- [Map.lookup (spanNumber s) (over x)]
-       , not (agree end' how || (how == Returns && (isStopped end' || end' == FaultedWith "EnoughOfThis")))
+       , not (agree end' how || (how == PartReturned && (isStopped end' || end' == FaultedWith "EnoughOfThis")))
        ]
  where
   es = entries (record' x)
@@ -262,10 +262,10 @@ endings x =
     Just (_, Decide {}) -> fmap (\(_, _, o) -> spanKind o) (Map.lookup s (begun x)) == Just Operator
     _ -> False
   agree end' how = case (end', how) of
-    (Succeeded, Returns) -> True
-    (FailedWith text, Fails' text') -> text == text'
-    (FaultedWith text, Faults' text') -> text == text'
-    (StoppedBy _, IsStopped) -> True
+    (Succeeded, PartReturned) -> True
+    (FailedWith text, PartFailed text') -> text == text'
+    (FaultedWith text, PartFaulted text') -> text == text'
+    (StoppedBy _, PartStopped) -> True
     _ -> False
 
 isStopped :: End -> Bool
