@@ -20,9 +20,9 @@ import Behavior
 import Behavior.Internal.Runtime (Label (..))
 import Behavior.Message (handleNext, messageRule, onMessage, withInbox)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
-import Behavior.STM (withTSem)
+import Behavior.STM (atomically, withTSem)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (abandoning, atomically, timeout, timeoutAt)
+import Behavior.Time (abandoning, timeout, timeoutAt)
 import Behavior.Trace (named, withTrace)
 import Support
 

@@ -11,8 +11,8 @@ module Agent
 import Control.Concurrent.STM (TVar, newTVarIO, readTVar, retry, writeTVar)
 
 import Behavior
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically)
 
 -- | What the program of a robot reads.
 data Agent = Agent

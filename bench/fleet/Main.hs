@@ -20,8 +20,8 @@ import System.Mem (performMajorGC)
 import Agent
 import Behavior
 import Behavior.Parallel
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically)
 import Measured
 
 main :: IO ()

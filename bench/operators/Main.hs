@@ -20,8 +20,8 @@ import System.Mem (performMajorGC)
 
 import Behavior
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, scoped)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically)
 import Behavior.Trace (Sink (..), TraceOptions (..), defaultTraceOptions, named, withTrace, withTraceOptions)
 import Measured
 

@@ -12,8 +12,9 @@ import System.Mem (performMinorGC)
 
 import Behavior
 import Behavior.Parallel (allOf)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, now)
+import Behavior.Time (now)
 
 main :: IO ()
 main = runInUnboundThread $ do

@@ -13,9 +13,10 @@ import System.Exit (die)
 import System.Mem (performMajorGC)
 
 import Behavior
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
-import Behavior.Time (atomically, checkpoint)
+import Behavior.Time (checkpoint)
 import Measured
 
 main :: IO ()

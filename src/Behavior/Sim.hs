@@ -6,7 +6,8 @@
 -- fails under one of them, 'explore' shrinks that schedule and shows its steps:
 --
 -- >>> import Behavior
--- >>> import Behavior.Time (atomically, now)
+-- >>> import Behavior.STM (atomically)
+-- >>> import Behavior.Time (now)
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, writeTVar)
 --
 -- >>> run <- simulate (both (sleep 3600) (sleep 1800) >> now)
@@ -42,7 +43,7 @@
 -- = How it works
 --
 -- One thread runs at a time. There is a /scheduling point/ before each operation of this
--- library (to start or to stop a thread, 'Behavior.Time.atomically', 'Behavior.sleep',
+-- library (to start or to stop a thread, 'Behavior.STM.atomically', 'Behavior.sleep',
 -- 'Behavior.Time.now', 'Behavior.Time.checkpoint') and before the end of a thread: there
 -- another thread may run. The virtual time advances when no thread is enabled.
 --

@@ -14,7 +14,6 @@ module Behavior.Time
   , sleep
   , sleepUntil
   , sleepForever
-  , atomically
   , checkpoint
 
     -- * Again

@@ -18,6 +18,7 @@ import Test.Hspec.QuickCheck (prop)
 
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Time

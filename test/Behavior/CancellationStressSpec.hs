@@ -22,8 +22,9 @@ import Test.QuickCheck hiding (Failure, within)
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
 import Behavior.Parallel (allOf, firstOf, fork, requestStop, scoped)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, timeout)
+import Behavior.Time (timeout)
 import Places
 import Support
 

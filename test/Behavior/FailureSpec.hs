@@ -16,7 +16,8 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Time (TimedOut (..), atomically, timeout)
+import Behavior.STM (atomically)
+import Behavior.Time (TimedOut (..), timeout)
 import Support
 
 spec :: Spec

@@ -12,9 +12,9 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 
 import Behavior
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (exhaustively, explore)
-import Behavior.Time (atomically)
 import Support
 import Watched
 

@@ -14,10 +14,10 @@ import Test.Hspec.QuickCheck (prop)
 
 import Behavior
 import Behavior.Message
+import Behavior.STM (atomically)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Plan, exhaustively, explore, randomly, simulate)
-import Behavior.Time (atomically)
 import Support
 
 spec :: Spec

@@ -16,11 +16,12 @@ import Test.QuickCheck (Positive (..))
 
 import Behavior
 import Behavior.Message
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Plan, exhaustively, explore, randomly, simulate)
 import Behavior.Sim.Mock (driver, eventually, happened, newMock, noted, shouldRecord)
 import qualified Behavior.Sim.Mock as Mock
-import Behavior.Time (atomically, now)
+import Behavior.Time (now)
 import Memory (inConstantMemory)
 import Support hiding (eventually, note)
 import qualified Support

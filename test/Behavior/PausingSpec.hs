@@ -14,9 +14,10 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (NonNegative (..), Positive (..), ioProperty, (===))
 
 import Behavior
+import Behavior.STM (atomically)
 import Behavior.Signal (Signal, pausedWhile, stoppedWhile, teleoReactive)
 import Behavior.Sim (Plan, exhaustively, explain, explore, outcome, randomly, simulate)
-import Behavior.Time (atomically, checkpoint, now, sleepForever, sleepUntil, timeout)
+import Behavior.Time (checkpoint, now, sleepForever, sleepUntil, timeout)
 import Support
 import Watched
 

@@ -16,10 +16,11 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (Gen, choose, forAll, ioProperty, listOf1, (===))
 
 import Behavior
+import Behavior.STM (atomically)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly, simulate)
-import Behavior.Time (atomically, now, sleepUntil)
+import Behavior.Time (now, sleepUntil)
 import Memory (inConstantMemory)
 import Support
 import Watched

@@ -17,6 +17,7 @@ import Test.QuickCheck hiding (Failure, within)
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
 import Behavior.Internal.Seconds (duration, period)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, simulate)
 import Behavior.Time

@@ -16,8 +16,8 @@ import Test.Hspec
 import Behavior.Sim (exhaustively, explore)
 import Behavior.UnliftIO
 import Behavior.UnliftIO.Parallel (allOf)
+import Behavior.UnliftIO.STM (atomically)
 import qualified Behavior.UnliftIO.Signal as Signal
-import Behavior.UnliftIO.Time (atomically)
 import Support (guarded)
 
 -- | What every part of the mission can use.

@@ -12,7 +12,7 @@ import Test.Hspec
 
 import Behavior
 import qualified Behavior.Paper as Paper
-import Behavior.Time (atomically)
+import Behavior.STM (atomically)
 import qualified Paper.AsPrinted.PassDoor as PassDoor
 import Paper.AsPrinted.Signatures ()
 import qualified Paper.AsPrinted.ThreeTimes as ThreeTimes

@@ -32,7 +32,7 @@ import Test.Hspec (shouldBe)
 
 import Behavior (Behavior, Failed (..), failWith)
 import Behavior.Internal.Runtime (liveThreadCount)
-import Behavior.Time (atomically)
+import Behavior.STM (atomically)
 import Robot (inWorld)
 import Support (Ending (..), ending, hang)
 import World

@@ -8,7 +8,7 @@ import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVarIO, writeTV
 import Test.Hspec
 
 import Behavior.Paper
-import Behavior.Time (atomically)
+import Behavior.STM (atomically)
 import Support (Ending (..), Fault (..), ending, guarded, hang)
 
 spec :: Spec

@@ -26,8 +26,9 @@ import Test.QuickCheck (Gen, choose, elements, frequency, vectorOf)
 import Behavior (Behavior, BehaviorFailed, attempt, both, failingOn, fallback, parallel)
 import Behavior.Internal.Failure (isCancellation)
 import qualified Behavior.Parallel as Parallel
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, timeout)
+import Behavior.Time (timeout)
 import Promises.Stage
 import Support (Cancel (..), Ending (..), hang)
 

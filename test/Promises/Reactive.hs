@@ -28,9 +28,10 @@ import Data.Foldable (for_)
 import Test.QuickCheck (Gen, choose, elements, frequency, vectorOf)
 
 import Behavior (Behavior, failWith)
+import Behavior.STM (atomically)
 import Behavior.Signal (watching)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, now)
+import Behavior.Time (now)
 import Promises.Stage
 import Support (Ending (..), Fault (..), hang)
 

@@ -19,10 +19,11 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Parallel (allOf)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
-import Behavior.Time (atomically, checkpoint)
+import Behavior.Time (checkpoint)
 import Behavior.Trace (named)
 import Memory (allocatedBy)
 import Support (guarded)

@@ -12,9 +12,10 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Parallel (allOf)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
-import Behavior.Time (atomically, checkpoint)
+import Behavior.Time (checkpoint)
 import Memory (liveBytes)
 import Support (guarded)
 

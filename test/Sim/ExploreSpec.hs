@@ -12,8 +12,9 @@ import Test.Hspec hiding (parallel)
 import Behavior
 import Behavior.Internal.Runtime (annotate)
 import Behavior.Parallel (allOf)
+import Behavior.STM (atomically)
 import Behavior.Sim
-import Behavior.Time (atomically, checkpoint)
+import Behavior.Time (checkpoint)
 import Support
 
 spec :: Spec

@@ -13,11 +13,12 @@ import Behavior
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime (Label (..), threadId, throwToAll, start, threadEnd)
 import Behavior.Parallel (firstOf)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (SimOptions (..), Outcome (..), Run (..), Schedule (..), defaultSimOptions, simulate, simulateWith)
 import qualified Behavior.Sim as Sim
 import Behavior.Sim.Mock
-import Behavior.Time (atomically, now, timeout)
+import Behavior.Time (now, timeout)
 import Support (Cancel (..), Ending (..), ending, guarded, leavingNothing)
 
 -- | Time passes in simulations, except for two milliseconds on real threads.

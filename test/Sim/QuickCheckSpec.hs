@@ -11,9 +11,9 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck
 
 import Behavior
+import Behavior.STM (atomically)
 import Behavior.Sim
 import Behavior.Sim.QuickCheck
-import Behavior.Time (atomically)
 import Support
 
 spec :: Spec

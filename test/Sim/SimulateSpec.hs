@@ -21,9 +21,10 @@ import Behavior
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime (annotate)
 import Behavior.Parallel (fork, scoped)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
-import Behavior.Time (atomically, checkpoint, now, timeout)
+import Behavior.Time (checkpoint, now, timeout)
 import Sim.Busy (busy)
 import Support
 
@@ -213,12 +214,12 @@ mistakes = do
   describe "a thread that blocks outside of the library," $ do
     outside "takeMVar" (newEmptyMVar >>= takeMVar) "use atomically and a TMVar"
     outside "threadDelay" (threadDelay 10000000) "use atomically and a TMVar, sleep"
-    outside "retry" (STM.atomically retry) "use Behavior.Time.atomically"
+    outside "retry" (STM.atomically retry) "use Behavior.STM.atomically"
     outside
       "System.Timeout"
       (void (System.timeout 10000000 (newEmptyMVar >>= takeMVar :: IO ())))
       "Behavior.Time.timeout"
-    outside "async" (async (threadDelay 10000000) >>= wait) "use Behavior.Time.atomically, parallel, both, fork"
+    outside "async" (async (threadDelay 10000000) >>= wait) "use Behavior.STM.atomically, parallel, both, fork"
     outside "race" (void (race (threadDelay 10000000) (threadDelay 10000000))) "use "
     outside
       "forkIO"

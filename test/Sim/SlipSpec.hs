@@ -11,8 +11,9 @@ import Test.Hspec hiding (parallel)
 
 import Behavior
 import Behavior.Parallel (allOf)
+import Behavior.STM (atomically)
 import Behavior.Sim
-import Behavior.Time (atomically, now)
+import Behavior.Time (now)
 import Support (guarded)
 
 spec :: Spec

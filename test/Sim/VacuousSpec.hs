@@ -16,11 +16,12 @@ import Test.QuickCheck (Args (chatty), Result (output), quickCheckWithResult, st
 
 import Behavior
 import Behavior.Message (onMessage, withInbox)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
 import Behavior.Sim.QuickCheck (underSchedules)
-import Behavior.Time (atomically, cleanupWithin, timeout, timeoutAt)
+import Behavior.Time (cleanupWithin, timeout, timeoutAt)
 import Behavior.Trace (named)
 import Support (guarded)
 

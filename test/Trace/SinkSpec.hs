@@ -15,10 +15,10 @@ import Test.Hspec
 
 import Behavior
 import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (..), defaultSimOptions, explain, outcome, simulateWith)
 import qualified Behavior.Sim as Sim
-import Behavior.Time (atomically)
 import Behavior.Trace
 import Support hiding (End, Ending (..), Failure, ThreadEvent (..))
 

@@ -14,8 +14,8 @@ import Data.Maybe (isJust)
 import Attack
 import Behavior
 import Behavior.Parallel (allOf, firstOf)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically)
 
 attack :: IO ()
 attack = do

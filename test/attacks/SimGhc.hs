@@ -13,8 +13,9 @@ import Data.List (nub, sort)
 import Attack
 import Behavior
 import Behavior.Parallel (await, firstOf, fork, requestStop, scoped, tryAwait)
+import Behavior.STM (atomically)
 import Behavior.Sim
-import Behavior.Time (atomically, timeout)
+import Behavior.Time (timeout)
 
 attack :: IO ()
 attack = forM_ programs $ \(name, fixed, program) -> do

@@ -13,8 +13,9 @@ import Data.IORef
 import Attack
 import Behavior
 import Behavior.Parallel (allOf, firstOf, scoped)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, timeout)
+import Behavior.Time (timeout)
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 
 attack :: IO ()

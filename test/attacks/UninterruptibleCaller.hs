@@ -10,8 +10,9 @@ import System.IO (hFlush, stdout)
 
 import Attack
 import Behavior
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (atomically, timeout)
+import Behavior.Time (timeout)
 
 attack :: IO ()
 attack =

@@ -16,6 +16,7 @@ import Behavior.Internal.Runtime
 -- $setup
 -- >>> import Behavior
 -- >>> import Behavior.Message
+-- >>> import Behavior.STM
 -- >>> import Behavior.Sim.Mock
 -- >>> import Behavior.Time
 -- >>> mock <- newMock

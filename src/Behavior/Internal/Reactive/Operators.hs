@@ -28,7 +28,7 @@ import Behavior.Internal.Signal.Source
 
 -- $setup
 -- >>> import Behavior
--- >>> import Behavior.Time (atomically)
+-- >>> import Behavior.STM (atomically)
 -- >>> import qualified Behavior.Signal as Signal
 
 -- | A reactive @if@: runs @left@ while the condition is true and @right@ while it

@@ -27,7 +27,7 @@ import Behavior.Internal.Sim.Types
 -- $setup
 -- >>> import Behavior
 -- >>> import Behavior.Sim
--- >>> import Behavior.Time (atomically)
+-- >>> import Behavior.STM (atomically)
 -- >>> import Control.Concurrent.STM (retry)
 
 -- | Describes how a run ended. If the cause is a mistake, the text says how to correct it.
@@ -91,7 +91,7 @@ waitAndAdvice = \case
     \use atomically and a TMVar, sleep, Behavior.Time.timeout, fork"
   InTransaction ->
     "in a transaction (Control.Concurrent.STM.atomically, or async's wait, race, concurrently): \
-    \use Behavior.Time.atomically, parallel, both, fork"
+    \use Behavior.STM.atomically, parallel, both, fork"
   InThunk ->
     "for a value that another thread is computing (it was lazy, and to compute it waits, \
     \or takes longer than realTimeLimit): compute it before, by evaluate"

@@ -14,7 +14,6 @@ module Behavior.UnliftIO.Time
   , sleep
   , sleepUntil
   , sleepForever
-  , atomically
   , checkpoint
 
     -- * Again
@@ -40,7 +39,6 @@ import Behavior (BehaviorFailed, Seconds)
 import Behavior.Time (Abandoned (..), TimedOut (..))
 import qualified Behavior.Time as IO
 import Behavior.UnliftIO (sleep)
-import Behavior.UnliftIO.STM (atomically)
 
 -- | 'Behavior.Time.now'.
 --
