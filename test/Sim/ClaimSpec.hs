@@ -119,6 +119,33 @@ names = do
       evaluate (countOf (startOf name) world) `shouldThrow` \(ErrorCall why) ->
         lines why == drop 1 (wrong (verdict (never (startOf name)) world))
 
+  it "have arguments as they are shown: without the quotes, or with others, it is an error" $ do
+    for_ misspelt $ \(given, shown) -> do
+      let why = "\"open\" was not called as " ++ show given ++ ", but as " ++ show shown ++ "."
+      for_ [never (startOf given), whenever (startOf given) mempty, never (startOf "drive" `during` running given)] $
+        \claim -> drop 1 (wrong (verdict claim (calledWith [shown, "open \"attic\""]))) `shouldBe` [why]
+      evaluate (countOf (endOf given) (calledWith [shown])) `shouldThrow` (== ErrorCall why)
+
+  it "have values as they are shown: one of another type, or a number of another, is an error" $ do
+    let been value = recordOf [("level", ACondition)] [line 0 "level" (Is value)]
+    for_ [never (becoming "level" (5 :: Int)), never (becoming "level" (5 :: Int) `outside` being "level" (5 :: Int))] $
+      \claim ->
+        drop 1 (wrong (verdict claim (been "5.0"))) `shouldBe` ["\"level\" was not recorded as 5, but as 5.0."]
+    drop 1 (wrong (verdict (never (becoming "level" "Low")) (been "Low")))
+      `shouldBe` ["\"level\" was not recorded as \"Low\", but as Low."]
+    for_ ["6.0", "-5.0", "55", "True"] $ \value ->
+      wrong (verdict (never (becoming "level" (5 :: Int))) (been value)) `shouldBe` []
+    wrong (verdict (eventually (becoming "level" (5 :: Int))) (been "5")) `shouldBe` []
+
+  it "have any argument otherwise: it is not known which there are" $
+    for_ otherArguments $ \(given, shown) -> do
+      wrong (verdict (never (startOf given)) (calledWith shown)) `shouldBe` []
+      countOf (startOf given) (calledWith shown) `shouldBe` 0
+
+  it "have an argument, unless something is called so" $ do
+    let door = recordOf [("open", AnActionOn), ("open front", AnAction)] [call "open \"front\""]
+    wrong (verdict (never (startOf "open front")) door) `shouldBe` []
+
   it "are said to be what the functions of the world have made" $ do
     mock <- newMock
     _ <- condition mock "c" [(0, 'x')]
@@ -134,6 +161,27 @@ names = do
  where
   world = recordOf ([("low", ACondition), ("drive", AnAction), ("open", AnActionOn)] ++ others) []
   others = [("camera", ASensor), ("orders", ADriver)]
+  call shown = RecordEntry 0 "open" (drop 5 shown) 1 Begins
+  calledWith = recordOf [("drive", AnAction), ("open", AnActionOn)] . map call
+  misspelt =
+    [ ("open front", "open \"front\"")
+    , ("open 'f'", "open \"f\"")
+    , ("open front", "open 'front'")
+    , ("open \"3\"", "open 3")
+    , ("open front", "open Door \"front\"")
+    , ("open front door", "open [\"front door\"]")
+    , ("open (-3)", "open -3")
+    , ("open 3", "open 3.0")
+    ]
+  otherArguments =
+    [ ("open \"cellar\"", ["open \"front\""])
+    , ("open cellar", ["open \"front\""])
+    , ("open \"door\"", ["open \"front door\""])
+    , ("open North", ["open Going North"])
+    , ("open 3", ["open 13"])
+    , ("open '+'", ["open '-'"])
+    , ("open 'x'", [])
+    ]
   found `refusedAs` text = found `shouldSatisfy` either (text `isInfixOf`) (const False)
   unknown =
     [ never (startOf "drvie")

@@ -255,11 +255,12 @@ holds claim = either (const False) (const True) . verdict claim
 -- This does not hold: never "low" begins.
 -- "low" is a condition, and never begins. The actions of this world: "drive", "charge".
 --
--- (The argument of an action may be any: one that is misspelt is not noticed.)
+-- (The argument of an action may be any, and one that is misspelt is not noticed; but one that is written
+-- otherwise than it is shown is, in a record that has it: @open front@ instead of @open "front"@.)
 --
 -- @since 0.1.0.0
 verdict :: Claim -> Record -> Either String ()
-verdict claim record = case unfit (recordSubjects record) (claimNeeds claim) of
+verdict claim record = case unfitIn record (claimNeeds claim) of
   Just why -> refuted (claimWords claim) why []
   Nothing -> for_ (violation claim record (Origin (-1) 0)) $ \v ->
     refuted (broken v) (capital (reason v) ++ if null entries then "." else ":") (excerpt (map fst (shown v)) entries)

@@ -7,6 +7,7 @@
 module Behavior.Internal.Mock.Moment
   ( Line
   , numbered
+  , unfitIn
   , time
 
     -- * Moments
@@ -86,7 +87,7 @@ data Moment = Moment
   }
 
 -- | The action begins. For an action with an argument the name alone means any argument,
--- and @"open \\"front\\""@ means this one.
+-- and @"open \\"front\\""@ means this one: an argument is written as it is shown.
 --
 -- @since 0.1.0.0
 startOf :: String -> Moment
@@ -130,13 +131,21 @@ interruptionOf :: String -> Moment
 interruptionOf = momentOf anyAction "is interrupted" (== StopRequested)
 
 -- | The condition, or the value that the sensor reads, becomes this, or is this from the
--- start. The record has values as they are shown: so a value of another type is one that never comes.
+-- start. The record has values as they are shown: so a value of another type is one that never comes. (If the
+-- record has it in the other type, as @5.0@ and not @5@, that is an error.)
 --
 -- @since 0.1.0.0
 becoming :: Show a => String -> a -> Moment
-becoming name value = momentOf [ASensor, ACondition] ("becomes " ++ show value) (`elem` kinds) name
+becoming name value =
+  (momentOf [] ("becomes " ++ shown) (`elem` [Is shown, Becomes shown]) name)
+    { momentNeeds = [needOf name "becomes " shown]
+    }
  where
-  kinds = [Is (show value), Becomes (show value)]
+  shown = show value
+
+-- | That something has this value.
+needOf :: String -> String -> String -> Need
+needOf name verb shown = Need name (verb ++ shown) [ASensor, ACondition] (Just shown)
 
 -- | This text was recorded by 'Behavior.Sim.Mock.note', or by a 'Behavior.Sim.Mock.driver'. It may be any
 -- text: one that nothing notes never comes.
@@ -149,7 +158,7 @@ momentOf :: [SubjectKind] -> String -> (EntryKind -> Bool) -> String -> Moment
 momentOf kinds verb isIt name =
   Moment
     { momentWords = show name ++ " " ++ verb
-    , momentNeeds = [Need name verb kinds]
+    , momentNeeds = [Need name verb kinds Nothing]
     , momentPremises = []
     , occurrences = filter (\(_, entry) -> entry `isAbout` name && isIt (entryKind entry)) . numbered
     }
@@ -259,9 +268,19 @@ infixl 8 `during`, `outside`, `overlapping`
 --
 -- @since 0.1.0.0
 countOf :: Moment -> Record -> Int
-countOf m record = case unfit (recordSubjects record) (momentNeeds m) of
+countOf m record = case unfitIn record (momentNeeds m) of
   Just why -> errorWithoutStackTrace why
   Nothing -> length (occurrences m record)
+
+-- | Why the first of the needs that does not fit the record does not, if there is one.
+unfitIn :: Record -> [Need] -> Maybe String
+unfitIn record = unfit (recordSubjects record) (mapMaybe shown (recordEntries record))
+ where
+  shown e = case entryKind e of
+    Is value -> Just (entrySubject e, value)
+    Becomes value -> Just (entrySubject e, value)
+    _ | null (entryArgument e) -> Nothing
+    _ -> Just (entrySubject e, entryArgument e)
 
 -- | The lines of a record.
 numbered :: Record -> [Line]
@@ -308,7 +327,7 @@ isInside place range = from range < place && place < to range
 -- @since 0.1.0.0
 running :: String -> Interval
 running name =
-  Interval (show name ++ " is running") [Need name "is running" anyAction] $
+  Interval (show name ++ " is running") [Need name "is running" anyAction Nothing] $
     rangesFrom (\e -> e `isAbout` name && entryKind e == Begins) $ \begun e ->
       fullName e == fullName begun && entryCall e == entryCall begun && isEnd (entryKind e)
 
@@ -317,10 +336,11 @@ running name =
 -- @since 0.1.0.0
 being :: Show a => String -> a -> Interval
 being name value =
-  Interval (show name ++ " is " ++ show value) [Need name ("is " ++ show value) [ASensor, ACondition]] $
-    rangesFrom (\e -> e `isAbout` name && entryKind e `elem` [Is (show value), Becomes (show value)]) $ \_ e ->
+  Interval (show name ++ " is " ++ shown) [needOf name "is " shown] $
+    rangesFrom (\e -> e `isAbout` name && entryKind e `elem` [Is shown, Becomes shown]) $ \_ e ->
       e `isAbout` name && changes (entryKind e)
  where
+  shown = show value
   changes (Becomes _) = True
   changes kind = kind == LosesValue
 

@@ -12,7 +12,7 @@ module Behavior.Internal.Mock.Subject
   , unfit
   ) where
 
-import Data.List (intercalate, isPrefixOf, nub, stripPrefix)
+import Data.List (intercalate, isPrefixOf, isSuffixOf, nub, stripPrefix)
 import Data.Maybe (listToMaybe, mapMaybe)
 
 -- $setup
@@ -49,6 +49,8 @@ data Need = Need
   { needName :: String
   , needVerb :: String
   , needKinds :: [SubjectKind]
+  , needValue :: Maybe String
+  -- ^ The value that the verb names, as it is shown.
   }
 
 -- | The kinds of actions.
@@ -58,26 +60,47 @@ anyAction = [AnAction, AnActionOn]
 -- | Why the first of the needs that does not fit the world does not, if there is one: a claim with it
 -- would be about nothing, so that 'Behavior.Sim.Mock.never' would hold whatever happened.
 --
--- >>> let world = [("low", ACondition), ("drive", AnAction)]
--- >>> let whyNot name = mapM_ putStrLn (unfit world [Need name "begins" anyAction])
+-- >>> let world = [("low", ACondition), ("drive", AnAction), ("open", AnActionOn)]
+-- >>> let shown = [("open", "\"front\"")]
+-- >>> let whyNot name = mapM_ putStrLn (unfit world shown [Need name "begins" anyAction Nothing])
 -- >>> whyNot "drive"
 -- >>> whyNot "low"
--- "low" is a condition, and never begins. The actions of this world: "drive".
+-- "low" is a condition, and never begins. The actions of this world: "drive", "open".
 -- >>> whyNot "drive 'x'"
 -- "drive" is an action without an argument, so nothing is called "drive 'x'".
 -- >>> whyNot "drvie"
--- Nothing in this world is called "drvie", only "low", "drive".
-unfit :: [(String, SubjectKind)] -> [Need] -> Maybe String
-unfit world = listToMaybe . mapMaybe unfitNeed
+-- Nothing in this world is called "drvie", only "low", "drive", "open".
+--
+-- It is not known which arguments and values there are. But one that was, as it is shown with the name of its
+-- action or condition, and is written in another way, is an error too:
+--
+-- >>> whyNot "open front"
+-- "open" was not called as "open front", but as "open \"front\"".
+-- >>> whyNot "open \"back\""
+unfit :: [(String, SubjectKind)] -> [(String, String)] -> [Need] -> Maybe String
+unfit world shown = listToMaybe . mapMaybe unfitNeed
  where
-  unfitNeed (Need name verb kinds)
-    | any ((`elem` kinds) . snd) namesakes = Nothing
+  unfitNeed (Need name verb kinds value)
+    | any ((`elem` kinds) . snd) namesakes = listToMaybe (maybe (unlikeCalls name) (unlikeValues name) value)
     | (_, kind) : _ <- namesakes = Just (name `is` kind ++ ", and " ++ negated verb ++ ". " ++ those kinds)
     | known : _ <- [known | (known, AnAction) <- world, (known ++ " ") `isPrefixOf` name] =
         Just (known `is` AnAction ++ " without an argument, so nothing is called " ++ show name ++ ".")
     | otherwise = Just ("Nothing in this world is called " ++ show name ++ ", only " ++ listed (map fst world) ++ ".")
    where
     namesakes = filter (`isCalled` name) world
+
+  unlikeCalls name =
+    [ show known ++ " was not called as " ++ show name ++ ", but as " ++ show (known ++ " " ++ argument) ++ "."
+    | name `notElem` map fst world
+    , (known, AnActionOn) <- world
+    , Just given <- [stripPrefix (known ++ " ") name]
+    , argument <- given `rewriting` known
+    ]
+  unlikeValues name given =
+    [show name ++ " was not recorded as " ++ given ++ ", but as " ++ value ++ "." | value <- given `rewriting` name]
+  given `rewriting` name = if given `elem` these then [] else filter (given `rewrites`) these
+   where
+    these = [text | (known, text) <- shown, known == name]
 
   those kinds = case [name | (name, kind) <- world, kind `elem` kinds] of
     [] -> "This world has no " ++ plurals " or " ++ "."
@@ -92,3 +115,16 @@ unfit world = listToMaybe . mapMaybe unfitNeed
 -- | Whether a name is that of the subject; of an action with an argument also with an argument.
 isCalled :: (String, SubjectKind) -> String -> Bool
 isCalled (known, kind) name = known == name || (kind == AnActionOn && (known ++ " ") `isPrefixOf` name)
+
+-- | Whether the first is the second, as it is shown, with other quotes or parentheses, or as a number of another
+-- type; or without quotes, also without the constructor before it.
+rewrites :: String -> String -> Bool
+given `rewrites` shown = bare given == bare shown || isSameNumber || (not (quoted given) && quoted shown && isEnd)
+ where
+  isEnd = bare given `isSuffixOf` bare shown
+  -- (The first digit is looked at first, since 'reads' takes long.)
+  isSameNumber =
+    take 1 given == take 1 shown && or [a == b | (a, "") <- reads given, (b, "") <- reads shown :: [(Double, String)]]
+  bare = words . map (\c -> if c `elem` marks then ' ' else c)
+  quoted = any (`elem` "\"'")
+  marks = "\"'()[]"
