@@ -227,9 +227,9 @@ relays size = do
 leftWins :: Stage -> Relay -> IO ()
 leftWins stage (Relay composition n runners) = do
   threadIds <- traverse (const newEmptyTMVarIO) runners
-  let before = pure () : map (\threadId' -> atomically (takeTMVar threadId') >>= untilOver stage) threadIds
-      runner (k, how) wait threadId' =
-        (k, wait >> mask_ (myThreadId >>= atomically . putTMVar threadId' >> finish k how))
+  let before = pure () : map (\variable -> atomically (takeTMVar variable) >>= untilOver stage) threadIds
+      runner (k, how) wait variable =
+        (k, wait >> mask_ (myThreadId >>= atomically . putTMVar variable >> finish k how))
       runs = zipWith3 runner runners before threadIds
       these = [fromMaybe hang (lookup k runs) | k <- [0 .. n - 1]]
       whole = case (composition, these) of

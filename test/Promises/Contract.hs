@@ -47,8 +47,8 @@ data Context = Context
 
 -- | Runs the program, and checks that no operator in it violated the clause.
 satisfies :: Clause -> Stage -> Program -> IO ()
-satisfies clause stage' (Program tree stimuli state) = do
-  context <- Context stage' <$> newTVarIO 0 <*> newLog <*> newIORef Map.empty
+satisfies clause place (Program tree stimuli state) = do
+  context <- Context place <$> newTVarIO 0 <*> newLog <*> newIORef Map.empty
   let caller = do
         before <- liveThreadCount
         end <- try (inState state (toBehavior context tree))
@@ -60,8 +60,8 @@ satisfies clause stage' (Program tree stimuli state) = do
           -- A caller that is to be cancelled waits for that. If its cancellation was lost, it
           -- waits for ever.
           _ -> if any (stopsCaller . snd) stimuli then hang else either throwIO pure end
-      whole = calling stage' (atomically . writeTVar (input context)) stimuli caller
-  end <- run stage' (if clause == Labels then watchingThreads (labelling context) whole else whole)
+      whole = calling place (atomically . writeTVar (input context)) stimuli caller
+  end <- run place (if clause == Labels then watchingThreads (labelling context) whole else whole)
   case end of
     Gave outcome
       | cancelledBy outcome, not (any (stopsCaller . snd) stimuli) ->
@@ -155,12 +155,12 @@ toBehavior t = \case
 
 -- | The first result when that many have succeeded.
 atLeast :: Int -> Behavior () -> [Maybe (Either BehaviorFailed Int)] -> Maybe (Behavior Int)
-atLeast m chosen ends'
+atLeast m chosen outcomes
   | length results >= m = Just (head results <$ chosen)
-  | length results + length (filter isNothing ends') < m = Just (chosen >> failWith "too few have succeeded")
+  | length results + length (filter isNothing outcomes) < m = Just (chosen >> failWith "too few have succeeded")
   | otherwise = Nothing
  where
-  results = [n | Just (Right n) <- ends']
+  results = [n | Just (Right n) <- outcomes]
 
 recordViolation :: Context -> Clause -> String -> IO ()
 recordViolation t clause = append (recordedViolations t) . (,) clause

@@ -36,8 +36,8 @@ import Promises.Stage
 import Support (Ending (..), Fault (..), hang)
 
 -- | Waits until the variable has a wanted value.
-until' :: TVar a -> (a -> Bool) -> Behavior ()
-until' var wanted = atomically (readTVar var >>= STM.check . wanted)
+untilIs :: TVar a -> (a -> Bool) -> Behavior ()
+untilIs var wanted = atomically (readTVar var >>= STM.check . wanted)
 
 -- * Dead sensors
 
@@ -95,7 +95,7 @@ notTakenForFalse stage (SensorFailure operator sensor cause fromTheStart act) = 
         Monitoring -> Signal.monitor signal (append others ()) branch
         Holding -> Signal.whileHolding signal branch
       stimuli = [(0, Changes ()) | not fromTheStart]
-  end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar dead True)) stimuli operating)
+  end <- run stage (calling stage (\() -> untilIs inside id >> atomically (writeTVar dead True)) stimuli operating)
   started <- readLog others
   unless (null started) $ broken "the other branch started"
   let expected
@@ -138,7 +138,7 @@ aPeriodApart stage (Script operator every values) = do
         now >>= append begun
         k <- atomically (modifyTVar' started (+ 1) >> readTVar started)
         pure (and (take 1 (drop (k - 1) values)) && k <= length values)
-      branch = until' started (> length values + 1)
+      branch = untilIs started (> length values + 1)
       signal = Signal.polling apart reading
   end <- run stage $ do
     t <- now
@@ -233,7 +233,7 @@ latched stage mission = do
         when isLast . void $ finish 9 (ofRecovery mission)
       stimuli = [(0, Changes ()) | not neededAtStart]
       whole = Signal.monitor (watching (readTVar needed)) recovering working
-  end <- run stage (calling stage (\() -> until' inside id >> atomically (writeTVar needed True)) stimuli whole)
+  end <- run stage (calling stage (\() -> untilIs inside id >> atomically (writeTVar needed True)) stimuli whole)
   reached <- readLog milestones
   let recovery = [RecoveryStarts, RecoveryEnds]
       allRecoveries = concatMap (const recovery) (rounds mission)
@@ -294,7 +294,7 @@ readAgain stage (Toggles sensor first stops) = do
               pause stage takesLong
               atomically (writeTVar condition new)
               throwIO (e :: SomeException)
-      toggle k = until' starts (>= k) >> atomically (modifyTVar' condition not)
+      toggle k = untilIs starts (>= k) >> atomically (modifyTVar' condition not)
       whole = Signal.rSelect signal (branch True) (branch False)
   end <- run stage (calling stage toggle [(0, Changes k) | k <- [1 .. length stops]] whole)
   these <- readLog started

@@ -69,12 +69,12 @@ begin t p = case p of
   Decide choice acts chosen -> case chosenBy choice (Nothing <$ acts) of
     Just (Succeeded _) -> begin t chosen
     Just wrong -> Over wrong
-    Nothing -> Waiting (Decision choice) (numbered "decide: " acts) `AndThen` chosen
+    Nothing -> Waiting (Choose choice) (numbered "decide: " acts) `AndThen` chosen
   Scoped body -> Waiting Nursery [thread t "scoped: body" body]
   Fork act -> Forking act Nothing
   Await act meanwhile -> Forking act (Just (False, meanwhile))
   StopChild act meanwhile -> Forking act (Just (True, meanwhile))
-  Timeout limit' _ -> Reacting p (Deadline (clock t + limit')) Always (Choosing FirstRead)
+  Timeout most _ -> Reacting p (Deadline (clock t + most)) Always (Choosing FirstRead)
   _ | any usesShared (signals p) -> Opening p
     | otherwise -> opened t p
  where

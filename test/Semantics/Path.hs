@@ -65,11 +65,11 @@ explains fuel visible world seen = go (Set.singleton (initial world)) (filter (v
     [] -> case silently fuel slip visible (upTo (end seen)) states of
       Nothing -> OutOfFuel
       Just these
-        | end seen `elem` ends' -> Possible
+        | end seen `elem` results -> Possible
         | Unknown t <- end seen, any (goesOnAt t) these -> Possible
-        | otherwise -> ImpossibleEnd ends'
+        | otherwise -> ImpossibleEnd results
        where
-        ends' = mapMaybe endOf (Set.toList these)
+        results = mapMaybe endOf (Set.toList these)
     rest@((t, transition) : later) -> case still t of
       Nothing -> OutOfFuel
       Just these -> case [s' | s <- at t these, (e, s') <- step s, e == transition] of
@@ -91,11 +91,11 @@ paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world)
   slip = slippage world
   go past states = do
     these <- silently fuel slip visible Nothing states
-    let ends' = Set.fromList (mapMaybe endOf (Set.toList these))
+    let results = Set.fromList (mapMaybe endOf (Set.toList these))
         next =
           Map.fromListWith Set.union $
             [((clock (now s), e), Set.singleton s') | s <- Set.toList these, (e, s') <- step s, visible e]
-        here = [Seen {timeline = reverse past, end = e} | e <- Set.toList ends']
+        here = [Seen {timeline = reverse past, end = e} | e <- Set.toList results]
     foldM
       (\found (seen, states') -> do
           more <- go (seen : past) states'

@@ -70,8 +70,8 @@ pollerSteps
   -> Steps Poller
 pollerSteps steps receive t s =
     case poll s of
-      Sleeping until'
-        | clock t >= until' ->
+      Sleeping due
+        | clock t >= due ->
             silently t $
               read'
                 s {slot = clock t + period s, readings = readings s + 1, inFlightSince = Just (clock t)}
@@ -150,7 +150,7 @@ throttleSteps t h source =
  where
   worker = throttleWorker h
   next = case restsUntil h of
-    Just until' -> [step | clock t >= until', step <- silently t (Throttled h {restsUntil = Nothing} source)]
+    Just due -> [step | clock t >= due, step <- silently t (Throttled h {restsUntil = Nothing} source)]
     Nothing -> case readSource t FirstRead (view worker) source of
       Just (Right (value, t', source'))
         | Just value /= passed h ->

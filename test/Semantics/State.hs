@@ -115,7 +115,7 @@ data Running
 data Operator
   = Race
   | Gather
-  | Decision Choice
+  | Choose Choice
   | Nursery
   | Share
   | React
@@ -228,12 +228,12 @@ endOf = \case
 
 over, completed :: Thread -> Bool
 over = isJust . endOf
-completed thread' = case endOf thread' of
+completed child = case endOf child of
   Just (Succeeded _) -> True
   _ -> False
 
 faultOf :: Thread -> [String]
-faultOf thread' = [fault | Just (FaultedWith fault) <- [endOf thread']]
+faultOf child = [fault | Just (FaultedWith fault) <- [endOf child]]
 
 threadsOf :: Phase -> [Thread]
 threadsOf = \case
@@ -247,9 +247,9 @@ threadsOf = \case
 -- | The times at which something is due.
 dueTimes :: Running -> [Ticks]
 dueTimes = \case
-  Acting _ until' _ -> [until']
-  Cleaning _ until' _ -> [until']
-  CleaningInterruptibly _ until' -> [until']
+  Acting _ due _ -> [due]
+  Cleaning _ due _ -> [due]
+  CleaningInterruptibly _ due -> [due]
   first `AndThen` _ -> dueTimes first
   first `OrElse` _ -> dueTimes first
   StoppingChild _ r -> dueTimes r
@@ -268,7 +268,7 @@ dueTimes = \case
   ofThreads threads = concat [dueTimes r | Thread _ (Live _ r) <- threads]
   ofSource = \case
     Deadline end -> [end]
-    Polling Poller {poll = Sleeping until'} -> [until']
+    Polling Poller {poll = Sleeping due} -> [due]
     Polling Poller {poll = Reading r} -> dueTimes r
     Joined _ sources -> concatMap ofSource sources
     WithHysteresis _ source -> ofSource source

@@ -54,13 +54,13 @@ steps t = \case
           | n + 1 < length scripts = t {calls = Map.insert name (n + 1) (calls t)}
           | otherwise = t
      in [(Emits (Action name Begins), called, Acting name (clock t + takes script) script)]
-  Acting name until' script ->
-    [(Emits (Action name (Ends (ends script))), t, Over (ended name (ends script))) | clock t >= until']
-  Cleaning name until' how ->
+  Acting name due script ->
+    [(Emits (Action name (Ends (ends script))), t, Over (ended name (ends script))) | clock t >= due]
+  Cleaning name due how ->
     [ (Emits (Action name (maybe Stops Ends how)), t, Over (maybe (Stopped Nothing) (ended (cleanupOf name)) how))
-    | clock t >= until'
+    | clock t >= due
     ]
-  CleaningInterruptibly name until' -> [(Emits (Action name Stops), t, Over (Stopped Nothing)) | clock t >= until']
+  CleaningInterruptibly name due -> [(Emits (Action name Stops), t, Over (Stopped Nothing)) | clock t >= due]
   first `AndThen` second -> [(l, t', andThen t' r second) | (l, t', r) <- steps t first]
   first `OrElse` second -> [(l, t', orElse t' r second) | (l, t', r) <- steps t first]
   Waiting operator threads ->
@@ -221,17 +221,17 @@ receive t = \case
   Starting _ -> stopped
   Opening _ -> stopped
   Calling _ _ -> stopped
-  Acting name until' script
+  Acting name due script
     | uninterruptible (masking script) -> []
     | otherwise -> [(Action name ReceivesStop, respond name (onStop script))]
    where
     uninterruptible = \case
       Unmasked -> False
-      Masked -> clock t >= until'
+      Masked -> clock t >= due
       Uninterruptible -> True
   Cleaning {} -> []
-  CleaningInterruptibly name until'
-    | clock t < until' -> [(Action name ReceivesStop, Over (Stopped Nothing))]
+  CleaningInterruptibly name due
+    | clock t < due -> [(Action name ReceivesStop, Over (Stopped Nothing))]
     | otherwise -> []
   first `AndThen` second -> fmap (\r -> andThen t r second) <$> receive t first
   first `OrElse` second -> fmap (\r -> orElse t r second) <$> receive t first
@@ -274,9 +274,9 @@ threadSteps t (Thread label state) = case state of
   Live requests (Returning result) -> returning Finished requests result
   Live requests (AsChild k (Returning result)) -> returning (FinishedChild k) requests result
   Live requests r -> [(l, t', becomes requests' r') | (l, t', requests', r') <- running' t requests r]
-  Finished result -> [ends' t result]
+  Finished result -> [publishes t result]
   FinishedChild k result ->
-    [ends' t {childResults = Map.insert k (Just (answer (asOutcome result))) (childResults t)} result]
+    [publishes t {childResults = Map.insert k (Just (answer (asOutcome result))) (childResults t)} result]
   Ended _ -> []
  where
   returning finished requests result =
@@ -288,7 +288,7 @@ threadSteps t (Thread label state) = case state of
     AsChild k (Over result) -> Thread label (FinishedChild k (asOutcome result))
     Over result -> Thread label (Finished (asOutcome result))
     r -> Thread label (Live requests r)
-  ends' t' result = (Emits (IsOver label), t', Thread label (Ended (asOutcome result)))
+  publishes t' result = (Emits (IsOver label), t', Thread label (Ended (asOutcome result)))
   answer = \case
     Stopped _ -> FailedWith childStopped
     result -> result

@@ -29,15 +29,15 @@ import Semantics.State
 verdict :: Operator -> [Thread] -> Maybe Result
 verdict operator threads = case operator of
   -- The first to finish; on a tie the left one.
-  Race -> firstOf ends'
-  Share -> firstOf ends'
+  Race -> firstOf results
+  Share -> firstOf results
   -- The first that does not complete; on a tie the left one.
   Gather
-    | all completed threads -> Just (Succeeded (Several [value | Succeeded value <- ends']))
+    | all completed threads -> Just (Succeeded (Several [value | Succeeded value <- results]))
     | otherwise -> firstOf wrongs
   -- A fault; or the choice.
-  Decision choice
-    | Just fault <- firstOf [result | result@(FaultedWith _) <- ends'] -> Just fault
+  Choose choice
+    | Just fault <- firstOf [result | result@(FaultedWith _) <- results] -> Just fault
     | Just chosen <- chosenBy choice (map endOf threads) -> Just chosen
     | all over threads -> Just (FaultedWith noneChosen)
     | otherwise -> Nothing
@@ -47,22 +47,22 @@ verdict operator threads = case operator of
     _ -> firstOf (filter (/= Stopped Nothing) wrongs)
   React -> Nothing
  where
-  ends' = mapMaybe endOf threads
+  results = mapMaybe endOf threads
   wrongs = mapMaybe endOf (filter (not . completed) threads)
   firstOf = find (const True)
 
 -- | Whether, given these ends, 'Decide' runs its last program, or fails; if it has chosen.
 chosenBy :: Choice -> [Maybe Result] -> Maybe Result
-chosenBy choice ends' = case choice of
+chosenBy choice results = case choice of
   AtLeast m
     | succeeded >= m -> Just (Succeeded Unit)
-    | succeeded + length (filter (== Nothing) ends') < m -> Just (FailedWith tooFew)
-  FirstEnd | result : _ <- catMaybes ends' -> Just $ case result of
+    | succeeded + length (filter (== Nothing) results) < m -> Just (FailedWith tooFew)
+  FirstEnd | result : _ <- catMaybes results -> Just $ case result of
     Succeeded _ -> Succeeded Unit
     wrong -> wrong
   _ -> Nothing
  where
-  succeeded = length [() | Just (Succeeded _) <- ends']
+  succeeded = length [() | Just (Succeeded _) <- results]
 
 -- | With a verdict, an operator requests the stop of all that still runs, at once.
 conclude :: Operator -> Result -> Source -> [Thread] -> Running
@@ -80,7 +80,7 @@ concluding operator result source threads
   kept
     | operator == Share, not (all over unfinished) = source
     | otherwise = remaining source
-  harmless thread' = over thread' && null (faultOf thread')
+  harmless child = over child && null (faultOf child)
 
 -- | The outcome is, in this order, the caller's cancellation, the leftmost fault, the
 -- verdict.

@@ -39,7 +39,7 @@ properties =
 
 -- | A record, and where things are in it. A place in it is the number of an entry.
 data Indexed = Indexed
-  { record' :: Record
+  { recorded :: Record
   , complete :: Bool
   -- ^ Whether the run was not cut off.
   , begun :: Map Int (Int, String, Span)
@@ -57,7 +57,7 @@ data Indexed = Indexed
 indexed :: Record -> Indexed
 indexed record =
   Indexed
-    { record' = record
+    { recorded = record
     , complete = either (const False) (const True) (seen record) && finishes
     , begun = starts
     , over =
@@ -114,9 +114,9 @@ structure x = concat (twice : map each (Map.elems (begun x)))
     ]
       ++ ["not begun: " ++ show s | (_, Received True _ (Ended s _ _)) <- es, spanNumber s `Map.notMember` begun x]
       ++ ["lost: " ++ show n | (_, Received _ _ (Lost n)) <- es]
-      ++ ["events of the run differ" | [e | (_, Received True _ e) <- es] /= Sim.events (whole (record' x)), complete x]
+      ++ ["events of the run differ" | complete x, [e | (_, Received True _ e) <- es] /= Sim.events (whole (recorded x))]
       ++ ["a number both of a span and of a reaction" | any (`Map.member` begun x) (Map.keys (reacted x))]
-  es = entries (record' x)
+  es = entries (recorded x)
   identity = \case
     Began s -> [(0 :: Int, spanNumber s)]
     Ended s _ _ -> [(1, spanNumber s)]
@@ -148,7 +148,7 @@ sameAmongNamed x =
   , expected /= given
   ]
  where
-  es = entries (record' x)
+  es = entries (recorded x)
   padded as bs =
     take (max (length as) (length bs)) (zip (map Just as ++ repeat Nothing) (map Just bs ++ repeat Nothing))
   amongNamed' = \case
@@ -206,7 +206,7 @@ parents x =
        | (_, HasLeft _ n how) <- es
        , not (isStop how)
        , n `Map.notMember` spanOf x
-       , Just (p, True) <- [Map.lookup n named']
+       , Just (p, True) <- [Map.lookup n parts]
        ]
     ++ [ "no span of an operator: " ++ show (n, p)
        | (_, HasOperated _ n PartReturned) <- es
@@ -215,8 +215,8 @@ parents x =
        , not (isDecide p)
        ]
  where
-  es = entries (record' x)
-  named' = Map.fromList [(n, (p, isNamed)) | (_, Entered _ n _ p isNamed) <- es]
+  es = entries (recorded x)
+  parts = Map.fromList [(n, (p, isNamed)) | (_, Entered _ n _ p isNamed) <- es]
   operators = Map.fromList [(n, p) | (_, Operates _ n _ p) <- es]
   isDecide = \case Decide {} -> True; _ -> False
   fits here thread parent = case ownerBranch here of
@@ -252,7 +252,7 @@ endings x =
        , not (agree end' how || (how == PartReturned && (isStopped end' || end' == FaultedWith "EnoughOfThis")))
        ]
  where
-  es = entries (record' x)
+  es = entries (recorded x)
   lefts = [(n, how) | (_, HasLeft _ n how) <- es] ++ [(n, how) | (_, HasOperated _ n how) <- es]
   leftBy = Map.fromList [(n, how) | (_, HasLeft _ n how) <- es]
   firsts = Map.fromList (reverse [(thread, n) | (_, Entered thread n _ _ _) <- es])
@@ -273,7 +273,7 @@ isStopped = \case StoppedBy _ -> True; _ -> False
 
 -- | The ends of branches, at the times that the specification has been compared with.
 asSpecified :: Indexed -> [String]
-asSpecified x = case seen (record' x) of
+asSpecified x = case seen (recorded x) of
   Right s
     | complete x
     , let expected = sort [(t, label) | (t, IsOver label) <- timeline s]
@@ -285,7 +285,7 @@ asSpecified x = case seen (record' x) of
   traced =
     sort
       [ (round t, spanName s)
-      | (_, Received True _ (Ended s t _)) <- entries (record' x)
+      | (_, Received True _ (Ended s t _)) <- entries (recorded x)
       , spanKind s == Branch
       , not (isWorker (spanName s))
       ]
@@ -467,7 +467,7 @@ values x =
     , Just (_, p) <- [Map.lookup n (partOf x)]
     ]
  where
-  es = entries (record' x)
+  es = entries (recorded x)
   decides p r = case [(changeBefore c, changeAfter c) | c <- reactionChanges r, changeSignal c == "level"] of
     [(before, after)]
       | not (isTeleoReactive p), now <- holds (read after), was <- holds . read <$> before -> case p of
@@ -506,8 +506,8 @@ values x =
      in changeAfter c `elem` current && maybe True (`elem` [show l | (_, _, _, _, At l) <- known]) (changeBefore c)
   -- When a condition had which level: places in the record, and times.
   history condition =
-    let first = fromMaybe NoValue (lookup condition (conditions (world (record' x))))
+    let first = fromMaybe NoValue (lookup condition (conditions (world (recorded x))))
         later = [(at, t, l) | ((at, c, l), t) <- zip [(at, c, l) | (at, IsSet c l) <- es] times, c == condition]
         sets = (-1, 0, first) : later
-        times = scanl1 max [t | Program.Change t _ _ <- changes (world (record' x))]
+        times = scanl1 max [t | Program.Change t _ _ <- changes (world (recorded x))]
      in zipWith (\(at, t, l) (at', t', _) -> (at, t, at', t', l)) sets (drop 1 sets ++ [(maxBound, maxBound, NoValue)])

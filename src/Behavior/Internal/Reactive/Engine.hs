@@ -143,12 +143,12 @@ interrupt :: Eq k => Engine k a -> Sensors -> Cause -> String -> Branch a -> Wak
 interrupt engine sensors cause name running = \case
   SensorDied e -> concluding (throwIO e)
   Changed _ _ (Conclude _ verdict) -> concluding verdict
-  Changed _ _ (RunToEnd name' recovery) ->
-    stopBranch sensors' >>= \end -> case end of
+  Changed _ _ (RunToEnd recoveryName recovery) ->
+    stopBranch sensorBranches >>= \end -> case end of
       Completed _ -> pure (endedBy name end)
-      Stopped _ -> forget (scope engine) running >> recover engine sensors cause name' recovery Nothing
+      Stopped _ -> forget (scope engine) running >> recover engine sensors cause recoveryName recovery Nothing
       -- A cleanup that threw must not keep the robot from its charger.
-      _ -> recover engine sensors cause name' recovery (Just (outcomeToIO end))
+      _ -> recover engine sensors cause recoveryName recovery (Just (outcomeToIO end))
   Changed {} ->
     stopBranch [] >>= \end -> case end of
       -- Read again: meanwhile the value may have changed again, perhaps back to the old one.
@@ -158,9 +158,9 @@ interrupt engine sensors cause name running = \case
         applyResponse engine sensors seen cause wakeup
       _ -> pure (endedBy name end)
  where
-  sensors' = map SomeBranch sensors
+  sensorBranches = map SomeBranch sensors
   concluding verdict =
-    stopBranch sensors' >>= \end -> pure $ case end of
+    stopBranch sensorBranches >>= \end -> pure $ case end of
       Stopped _ -> Verdict cause verdict
       _ -> endedBy name end
   -- Waits for the branch, but not for the others.
@@ -177,7 +177,7 @@ interrupt engine sensors cause name running = \case
       SensorDied _ -> pure ()
     pure (seen, wakeup)
 
--- | Runs the recovery to its end. The sensors' stop has been requested: the recovery does not
+-- | Runs the recovery to its end. The sensorBranches stop has been requested: the recovery does not
 -- wait for those that are slow to stop, but what comes after it does.
 recover :: Eq k => Engine k a -> Sensors -> Cause -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (Verdict a)
 recover engine sensors cause name recovery taskOutcome = do

@@ -67,24 +67,24 @@ polling every act = Signal $ \demand -> do
           writeIORef next $! slot + every
           when (readingTimes demand) $ atomically (writeTVar inFlight (Just slot))
           generation <- readTVarIO views
-          (read', stopWanted) <- mask $ \restore -> do
-            read' <- trySynchronous (restore act)
+          (reading, stopWanted) <- mask $ \restore -> do
+            reading <- trySynchronous (restore act)
             -- The stop request, if there is one, stays pending until what went wrong has
             -- been thrown.
             stopWanted <- stopRequested
             -- The reading is no longer needed, and may have swallowed the stop request.
             -- A fault of its cleanup is not lost.
-            when stopWanted (either throwIO (const (pure ())) read')
-            pure (read', stopWanted)
+            when stopWanted (either throwIO (const (pure ())) reading)
+            pure (reading, stopWanted)
           unless stopWanted $ do
-            changed <- case (published, read') of
+            changed <- case (published, reading) of
               -- (A view that was taken meanwhile waits for this reading, whatever its value.)
-              (Published generation' old, Right new) | generation == generation' -> differs old new
+              (Published lastGeneration old, Right new) | generation == lastGeneration -> differs old new
               _ -> pure True
             when (changed || readingTimes demand) . atomically $ do
-              when changed (writeTVar newest (Just (generation, read')))
+              when changed (writeTVar newest (Just (generation, reading)))
               when (readingTimes demand) (writeTVar inFlight Nothing)
-            now >>= \t' -> readFrom t' (slotAfter every t' (slot + every)) $! case read' of
+            now >>= \t' -> readFrom t' (slotAfter every t' (slot + every)) $! case reading of
               _ | not changed -> published
               Left _ -> Unpublished
               Right new -> Published generation new
@@ -97,7 +97,7 @@ polling every act = Signal $ \demand -> do
           writeTVar views n
           pure . constantView $
             readTVar newest >>= \case
-              Just (generation, read') | generation >= n -> either throwSTM pure read'
+              Just (generation, reading) | generation >= n -> either throwSTM pure reading
               _ -> retry
       , inFlightSince = readTVar inFlight
       , names = []

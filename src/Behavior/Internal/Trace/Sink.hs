@@ -142,8 +142,8 @@ drain running destination = do
     then unless (phase q >= Closed) (awaitWake >> drain running destination)
     else do
       writeIORef (inFlight running) (produced q)
-      now' <- change (\after -> (after {taken = 0}, phase after))
-      unless (now' == LeftBehind) $ do
+      latest <- change (\after -> (after {taken = 0}, phase after))
+      unless (latest == LeftBehind) $ do
         pass (size q) (reverse (newestFirst q)) (dropped q)
         _ <- timeout 10000 (readMVar (closing running))
         drain running destination

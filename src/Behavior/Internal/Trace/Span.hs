@@ -212,7 +212,7 @@ reportSpan event open = for_ (receivers (trace place)) $ \receiver ->
 
 -- | The span around a place, for a receiver.
 parentFor :: Receiver -> Place -> Parent
-parentFor receiver place = case [span' | span' <- around place, isSeenBy receiver span'] of
+parentFor receiver place = case [s | s <- around place, isSeenBy receiver s] of
   InSpan _ n : _ | n >= firstNumber receiver -> Inside n
   InUnknown : _ -> UnknownParent
   InBranchOf _ : outer -> parentFor receiver place {around = outer}
