@@ -1,10 +1,13 @@
 -- |
--- Random programs under explored schedules. Everything here runs in simulations, which are the same
--- under each runtime.
+-- What is the same under each runtime: random programs under explored schedules (everything there runs in
+-- simulations), and how time and memory grow.
 module Main (main) where
 
 import Test.Hspec
 
+import qualified Behavior.ReactiveSpaceSpec
+import qualified Behavior.ScaleSpec
+import qualified Behavior.SpaceSpec
 import qualified Promises.PromisesSimSpec
 import qualified SemanticsSpec
 import qualified Sim.ExploreSpaceSpec
@@ -19,3 +22,7 @@ main = hspec $ do
     Trace.ProgramsSpec.spec
     Trace.MessagesSpec.spec
   describe "Many schedules" Sim.ExploreSpaceSpec.spec
+  describe "Space" $ do
+    Behavior.SpaceSpec.spec
+    Behavior.ReactiveSpaceSpec.spec
+    Behavior.ScaleSpec.spec

@@ -17,7 +17,7 @@ import Data.Foldable (for_)
 import Data.List (intercalate, isInfixOf)
 import qualified Data.Set as Set
 import Test.Hspec
-import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
+import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck
 
 import Behavior.Sim (Schedule (..))
@@ -27,27 +27,27 @@ import Semantics.Path
 import Semantics.Program
 import Semantics.Run
 import Semantics.Shrink
+import Support (sampling)
 
 spec :: Spec
 spec = do
   describe "The relation" relation
   describe "The library" library
 
--- | With @--qc-max-success@ more programs are tried.
 library :: Spec
 library = do
-  modifyMaxSuccess (max 3000) $
+  sampling 3000 $
     prop "does only what the relation allows, for random programs" onlyWhatIsAllowed
   it "does only what the relation allows, for rare situations under many schedules" $
     for_ rareWorlds $ \world -> for_ [1 .. 1000] $ \seed -> judge world seed `shouldReturn` Fine
   it "can do all that the relation allows, for rare situations" $
     for_ rareWorlds $ \world -> compared world `shouldReturn` Fine
-  modifyMaxSuccess (max 60 . (`div` 100)) $
+  sampling 60 $
     prop "can do all that the relation allows, for small random programs" allThatIsAllowed
-  modifyMaxSuccess (max 500 . (`div` 6)) $
+  sampling 500 $
     prop "does only what the relation allows when timers are late" $
       onlyWhatIsAllowedOf 10 (slipping (worlds 3))
-  modifyMaxSuccess (max 30 . (`div` 200)) $
+  sampling 30 $
     prop "can do all that the relation allows when timers are late" $
       allThatIsAllowedOf (slipping smallWorlds)
 

@@ -28,18 +28,15 @@ import qualified Behavior.PolledSpec
 import qualified Behavior.PollingSpec
 import qualified Behavior.PromisesSpec
 import qualified Behavior.RateSpec
-import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ReactiveSpec
 import qualified Behavior.RepeatingSpec
 import qualified Behavior.ResumableSpec
 import qualified Behavior.RunBehaviorSpec
 import qualified Behavior.RuntimeSpec
 import qualified Behavior.STMSpec
-import qualified Behavior.ScaleSpec
 import qualified Behavior.ScopedSpec
 import qualified Behavior.SemaphoreSpec
 import qualified Behavior.SignalSpec
-import qualified Behavior.SpaceSpec
 import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
 import qualified Behavior.TimerWheelSpec
@@ -116,10 +113,6 @@ main = hspec $ do
     Behavior.ThrowingCleanupSpec.spec
   describe "Promises" Behavior.PromisesSpec.spec
   describe "Cancellation stress" Behavior.CancellationStressSpec.spec
-  describe "Space" $ do
-    Behavior.SpaceSpec.spec
-    Behavior.ReactiveSpaceSpec.spec
-    Behavior.ScaleSpec.spec
   describe "Simulation" $ do
     Sim.SimulateSpec.spec
     Sim.DeliverySpec.spec

@@ -14,6 +14,7 @@ module Support
   , within
   , leavingNothing
   , onOneCapability
+  , sampling
 
     -- * Gates
   , Gate
@@ -70,11 +71,13 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (replicateM_, unless)
 import Data.Foldable (for_, traverse_)
-import Data.Maybe (isNothing)
+import Data.Maybe (isJust, isNothing)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
+import System.Environment (lookupEnv)
 import System.Mem.Weak (deRefWeak)
 import System.Timeout (timeout)
-import Test.Hspec (Spec, around_, expectationFailure)
+import Test.Hspec (Spec, around_, expectationFailure, runIO)
+import Test.Hspec.QuickCheck (modifyMaxSuccess)
 import Test.QuickCheck (Arbitrary (..), Property, elements, frequency, ioProperty, (===))
 
 import Behavior
@@ -126,6 +129,15 @@ leavingNothing act = mask $ \restore -> do
 -- | Runs the action on one of GHC's capabilities.
 onOneCapability :: IO a -> IO a
 onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCapabilities . const
+
+-- | Tries that many random inputs where all tests run under all runtimes (the variable @EVERYWHERE@ is set, as in
+-- CI), and a third of them otherwise. With @--qc-max-success@, that many of what is cheapest: the number here is
+-- the share of it, in 3,000.
+sampling :: Int -> Spec -> Spec
+sampling share tests = do
+  everywhere <- runIO (isJust <$> lookupEnv "EVERYWHERE")
+  let least = if everywhere then share else share `div` 3
+  modifyMaxSuccess (\asked -> max least (asked * share `div` 3000)) tests
 
 -- | Blocks the threads that pass it until it is opened; it is never closed again.
 newtype Gate = Gate (TVar Bool)

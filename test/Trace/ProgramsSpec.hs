@@ -15,7 +15,7 @@ import Data.Foldable (for_)
 import Data.IORef
 import GHC.Conc (getUncaughtExceptionHandler, setUncaughtExceptionHandler)
 import Test.Hspec
-import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
+import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck
 
 import Behavior.Sim (Schedule (..))
@@ -25,18 +25,18 @@ import Semantics.Generate (worlds)
 import Semantics.Path (Seen (end), Verdict (..), everything, explains)
 import Semantics.Program
 import Semantics.Shrink
-import Support (leavingNothing)
+import Support (leavingNothing, sampling)
 import Trace.Recorder (Record (seen, whole), entries, recordedRun)
 import Trace.Rules
 
--- | Each simulation has its own watchdog. (With @--qc-max-success@ more programs are tried.)
+-- | Each simulation has its own watchdog.
 spec :: Spec
 spec = around_ leavingNothing $ do
-  modifyMaxSuccess (max 200) $
+  sampling 200 $
     prop "are what the programs did" tracedRight
   it "are what the programs did, in rare situations under many schedules" $
     for_ rareWorlds $ \w -> for_ [1 .. 150] $ \seed -> wrongly seed w `shouldReturn` []
-  modifyMaxSuccess (max 100 . (`div` 4)) $
+  sampling 100 $
     prop "are equal for equal seeds, and change no run, with and without sinks" sinksChangeNothing
 
 -- | A random program, under a random schedule.
