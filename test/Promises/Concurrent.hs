@@ -127,7 +127,7 @@ isStop = \case
 -- * Simultaneous stop requests
 
 -- | Concurrent behaviours that are stopped at the same time.
-data Group = Group Composition [StopHandling] Cause
+data Group = Group Composition [StopHandling] StopCause
   deriving (Show)
 
 data Composition = AsFirst | AsDecision | AsAll | AsPair | AsRace | AsForks | AsTaskAndSensor
@@ -142,7 +142,7 @@ data StopHandling
     Uninterruptible
   deriving (Eq, Show)
 
-data Cause = ByCaller | ByFailure
+data StopCause = ByCaller | ByFailure
   deriving (Eq, Show)
 
 groups :: Size -> Gen Group

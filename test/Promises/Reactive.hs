@@ -42,7 +42,7 @@ untilIs var wanted = atomically (readTVar var >>= STM.check . wanted)
 -- * Dead sensors
 
 -- | A sensor that dies while the operator runs, or before its first value.
-data SensorFailure = SensorFailure Operator Sensor Cause Bool Act
+data SensorFailure = SensorFailure Operator Sensor SensorError Bool Act
   deriving (Show)
 
 data Operator = Selecting Bool | Monitoring | Holding
@@ -51,7 +51,7 @@ data Operator = Selecting Bool | Monitoring | Holding
 data Sensor = WatchedSensor | PolledSensor Int
   deriving (Eq, Show)
 
-data Cause = Failing | Faulting | LosingValue
+data SensorError = Failing | Faulting | LosingValue
   deriving (Eq, Show)
 
 sensorFailures :: Size -> Gen SensorFailure

@@ -114,9 +114,10 @@ structure x = concat (twice : map each (Map.elems (begun x)))
     ]
       ++ ["not begun: " ++ show s | (_, Received True _ (Ended s _ _)) <- es, spanNumber s `Map.notMember` begun x]
       ++ ["lost: " ++ show n | (_, Received _ _ (Lost n)) <- es]
-      ++ ["events of the run differ" | complete x, [e | (_, Received True _ e) <- es] /= Sim.events (whole (recorded x))]
+      ++ ["events of the run differ" | complete x, [e | (_, Received True _ e) <- es] /= Sim.events run]
       ++ ["a number both of a span and of a reaction" | any (`Map.member` begun x) (Map.keys (reacted x))]
   es = entries (recorded x)
+  run = whole (recorded x)
   identity = \case
     Began s -> [(0 :: Int, spanNumber s)]
     Ended s _ _ -> [(1, spanNumber s)]
