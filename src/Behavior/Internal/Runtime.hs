@@ -27,7 +27,6 @@ module Behavior.Internal.Runtime
   , now
   , sleep
   , sleepUntil
-  , sleepBetween
   , sleepToSlot
 
     -- * Recording
