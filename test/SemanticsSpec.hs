@@ -22,11 +22,9 @@ import Test.QuickCheck
 
 import Behavior.Sim (Schedule (..))
 import Semantics.Generate
-import Semantics.Parts (depth)
 import Semantics.Path
 import Semantics.Program
 import Semantics.Run
-import Semantics.Shrink
 import Support (sampling)
 
 spec :: Spec

@@ -5,9 +5,7 @@
 -- The sources of signals: how they are opened, read and stopped.
 module Semantics.Source
   ( -- * Opening
-    signals
-  , usesShared
-  , open
+    open
   , unstarted
   , startSource
   , viewOf
@@ -33,31 +31,6 @@ import Semantics.Program
 import Semantics.State
 
 -- * Opening
-
--- | The signals of an operator.
-signals :: Program -> [Signal]
-signals = \case
-  RSelect s _ _ -> [s]
-  Monitor s _ _ -> [s]
-  InsteadWhen s _ _ -> [s]
-  Switch s _ -> [s]
-  TeleoReactive rules -> map fst rules
-  WaitUntil s -> [s]
-  WhileHolding s _ -> [s]
-  WithShared s _ -> [s]
-  _ -> []
-
--- | Whether a signal uses a shared one.
-usesShared :: Signal -> Bool
-usesShared = \case
-  Shared -> True
-  Watched _ -> False
-  Polled _ _ -> False
-  And a b -> usesShared a || usesShared b
-  Hysteresis _ _ _ s -> usesShared s
-  Debounce _ s -> usesShared s
-  Throttle _ s -> usesShared s
-  StaleAfter _ s -> usesShared s
 
 -- | Opens a signal, and starts the threads that it needs.
 open :: Now -> Signal -> Source

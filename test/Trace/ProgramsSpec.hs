@@ -21,10 +21,9 @@ import Test.QuickCheck
 import Behavior.Sim (Schedule (..))
 import qualified Behavior.Sim as Sim
 import Behavior.Trace (Sink (..), TraceOptions (..), defaultTraceOptions, withTrace, withTraceOptions)
-import Semantics.Generate (worlds)
+import Semantics.Generate (shrinkWorld, worlds)
 import Semantics.Path (Seen (end), Verdict (..), everything, explains)
 import Semantics.Program
-import Semantics.Shrink
 import Support (leavingNothing, sampling)
 import Trace.Recorder (Record (seen, whole), entries, recordedRun)
 import Trace.Rules

@@ -91,7 +91,7 @@ recordedRun around salt how w = do
         thread <- self
         noting (write (Entered thread n here p isNamed)) (write . HasLeft thread n) $
           if isNamed then named (nameOf n) (act (Owner (Just n) Nothing)) else act here
-      operating here p run = case operatorName p of
+      operating here p run = case programName p of
         Nothing -> run here here
         Just _ -> do
           n <- part
@@ -110,7 +110,7 @@ recordedRun around salt how w = do
       instrument =
         Instrument
           { root = Owner Nothing Nothing
-          , inBranch = \label here -> here {ownerBranch = Just label}
+          , branchOf = \label here -> here {ownerBranch = Just label}
           , aroundAll = \act -> mask $ \restore ->
               myPlace >>= \case
                 Nothing -> restore (around act)

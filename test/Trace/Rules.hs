@@ -15,9 +15,8 @@ import Data.Maybe (fromMaybe, isJust, isNothing, listToMaybe, maybeToList)
 import Behavior.Internal.Trace.Event
 import qualified Behavior.Sim as Sim
 import Semantics.Path (Seen (..))
-import Semantics.Program (Level (..), Program (..), Transition (IsOver), World (changes, conditions), holds)
+import Semantics.Program (Level (..), Program (..), Transition (IsOver), World (changes, conditions), holds, programName)
 import qualified Semantics.Program as Program
-import Semantics.Run (operatorName)
 import Trace.Recorder
 
 -- | What is wrong with the trace of the run; nothing if all is as it must be.
@@ -188,7 +187,7 @@ parents x =
        | (n, (_, p)) <- Map.toList (partOf x)
        , Just (_, _, s) <- [Map.lookup n (begun x)]
        , spanKind s == Operator
-       , Just (spanName s) /= operatorName p
+       , Just (spanName s) /= programName p
        ]
     ++ concat
       [ case (spanName s, spanParent s) of
@@ -486,16 +485,7 @@ values x =
       Timeout _ _ -> null levels
       _ -> False
   isTeleoReactive = \case TeleoReactive _ -> True; _ -> False
-  direct p = not (any (`isInfixOf` show (signalsOf p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
-  signalsOf = \case
-    RSelect s _ _ -> [s]
-    Monitor s _ _ -> [s]
-    InsteadWhen s _ _ -> [s]
-    WhileHolding s _ -> [s]
-    WaitUntil s -> [s]
-    Switch s _ -> [s]
-    TeleoReactive rules -> map fst rules
-    _ -> []
+  direct p = not (any (`isInfixOf` show (Program.signals p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
   -- The numbers of the spans before and after say where in the record the operator decided.
   held at r c =
     let n = reactionNumber r
