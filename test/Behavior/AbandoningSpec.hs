@@ -68,6 +68,15 @@ spec = guarded . describe "abandoning" $ do
             sleep 5
           readIORef abandoned `shouldReturn` expected
 
+    it "is counted right under any schedule if it ends just as its time is up" $
+      void . explore (exhaustively 1) $ \simulate' -> do
+        counted <- newIORef (-1)
+        _ <- simulate' $ do
+          timeout 1 (abandoning 2 (hang `onException` uninterruptibleMask_ (sleep 2))) ? pure ()
+          sleep 1
+          abandonedCount >>= writeIORef counted
+        readIORef counted `shouldReturn` 0
+
   it "on real threads: goes on, counts it, and reports by the handler for uncaught exceptions" $ do
     reports <- newLog
     entered <- newGate

@@ -60,8 +60,9 @@ spec = guarded . describe "agreeing" $ do
       `shouldReturn` FaultedWith "no scale"
 
   it "of 200 sensors that agree in groups" $
-    timed (agreeing 11 (==) [pure (n `mod` 20) | n <- [1 .. 200 :: Int]])
-      `shouldReturn` (0, Left "FailedBecause \"no 11 of 200 agree\"")
+    for_ [(11, 20), (51, 4)] $ \(m, groups) ->
+      timed (agreeing m (==) [pure (n `mod` groups) | n <- [1 .. 200 :: Int]])
+        `shouldReturn` (0, Left ("FailedBecause \"no " ++ show m ++ " of 200 agree\""))
 
   it "gives results that agree under all schedules of sensors that answer at the same time"
     . void . explore (exhaustively 1) $ \simulate' ->

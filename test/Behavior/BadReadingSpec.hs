@@ -6,20 +6,22 @@
 module Behavior.BadReadingSpec (spec) where
 
 import Control.Concurrent.Async (asyncThreadId)
-import Control.Concurrent.STM (catchSTM)
+import Control.Concurrent.STM (catchSTM, orElse)
 import Control.Exception
 import Control.Monad (void, when)
 import Data.Foldable (for_)
+import Data.IORef (newIORef, readIORef, writeIORef)
 import Data.Maybe (isJust)
 import Test.Hspec
 
 import Behavior (Failed)
 import Behavior.Internal.Cause (Cause (..))
-import Behavior.Internal.Runtime (atomically, now)
+import Behavior.Internal.Runtime (atomically, now, sleep)
 import Behavior.Internal.Scope (Verdict (..), SomeBranch (..), requestStopAsync, outcome, structured)
 import Behavior.Internal.Signal.Source (startSensors)
 import qualified Behavior.Internal.Signal.Source as Source
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (simulate)
 import Support
 import Watched
 
@@ -215,6 +217,21 @@ stale = do
       _ <- startSensors scope source
       atomically reading >>= (`shouldSatisfy` (/= began))
       pure (Verdict (SiblingFinished "test") (pure ()))
+
+  it "does not count after a recovery a reading that was overdue before it" $ do
+    found <- newIORef []
+    _ <- simulate $ do
+      source <- Source.open (Signal.staleAfter 1 (Signal.polling 1 (hang :: IO ()))) Source.everyValue
+      let isStale seen = ((False <$ Source.firstRead seen) `orElse` pure False) `catchSTM` \(_ :: Failed) -> pure True
+      structured "test" $ \scope -> do
+        (before', workers) <- startSensors scope source
+        sleep 1.5
+        requestStopAsync (SiblingFinished "test") (map SomeBranch workers)
+        for_ workers (atomically . outcome)
+        (after', _) <- startSensors scope source
+        traverse (atomically . isStale) [before', after'] >>= writeIORef found
+        pure (Verdict (SiblingFinished "test") (pure ()))
+    readIORef found `shouldReturn` [True, False]
 
   it "still fails when the reading that was overdue has ended" $ do
     entered <- newGate

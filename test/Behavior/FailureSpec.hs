@@ -53,6 +53,12 @@ hierarchy = do
     (failWith "stuck" `catch` \(e :: BehaviorFailed) -> pure (displayException e))
       `shouldReturn` "the behaviour failed: stuck"
 
+  it "shows the path of a failure before it, in parentheses where other exceptions have them" $ do
+    let lost = BehaviorFailed ["mission", "arm"] Failed
+    show lost `shouldBe` "mission > arm: Failed"
+    show (Just lost) `shouldBe` "Just (mission > arm: Failed)"
+    displayException lost `shouldBe` "mission > arm: the behaviour failed"
+
   it "does not take a fault or a cancellation for a failure" $ do
     ending (throwIO (Fault "bug") `catch` \(_ :: BehaviorFailed) -> pure ())
       `shouldReturn` FaultedWith (show (Fault "bug"))
@@ -356,6 +362,19 @@ failingOns = do
     cancelling (failingOn everything (open inside >> hang) ? note entries "went on") (pass inside)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
     notes entries `shouldReturn` []
+
+  it "throws what it has caught, although a cancellation comes just then" $ do
+    entered <- newGate
+    mayGo <- newGate
+    (_, done) <- observing $ \entries -> do
+      let act = uninterruptibleMask_ (open entered >> pass mayGo >> throwIO (Cancel "first")) :: IO ()
+          caught = mask $ \restore -> ending (restore (failingOn everything act)) >>= note entries
+      withThread caught $ \caller -> do
+        pass entered
+        throwing (asyncThreadId caller) (Cancel "second")
+        open mayGo
+        awaitEnd caller
+    done `shouldBe` [CancelledBy (show (Cancel "first"))]
 
   it "does not prevent a behaviour that has timed out from stopping" $ do
     (end, done) <- observing $ \entries ->

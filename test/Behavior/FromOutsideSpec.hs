@@ -163,6 +163,22 @@ instance Eq Key where
 
 undefinedExceptions :: Spec
 undefinedExceptions = do
+  it "thrown to the caller from outside: is thrown when the branches have ended" $ do
+    entered <- newGate
+    stopping <- newGate
+    mayEnd <- newGate
+    entries <- newLog
+    let slow = (open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd >> note entries "cleaned up")
+    end <- withThread (parallel slow hang) $ \caller -> do
+      pass entered
+      throwing (asyncThreadId caller) (throw (Fault "undefined") :: Cancel)
+      pass stopping
+      stillRunning caller
+      open mayEnd
+      awaitEnd caller
+    evaluate (length (show end)) `shouldThrow` (== Fault "undefined")
+    notes entries `shouldReturn` ["cleaned up"]
+
   for_ exceptions $ \(kind, bottom) -> do
     for_ several $ \(name, operator) ->
       it (name ++ ", " ++ kind ++ ": ends as a fault, after the other branch's cleanup") $

@@ -253,6 +253,8 @@ ties = do
     mostly both (failWith "left") (failWith "right") (FailedWith (show (FailedBecause "left")))
   it "scoped: of those forked, the failure of the first forked counts when both have failed" $
     mostly forking (failWith "left") (failWith "right") (FailedWith (show (FailedBecause "left")))
+  it "scoped: the scoped behaviour's end counts when what it has forked has failed, too" $
+    mostly (\own forked -> scoped (\nursery -> fork nursery forked >> own)) (pure ()) failed (Gave ())
   it "parallel and both: also when both have ended before the operator waits" $
     for_ [parallel, both] $ \operator -> onOneCapability $ do
       ends <- replicateM 50 (ending (operator (failWith "left") (failWith "right" :: IO ()) :: IO ()))

@@ -228,6 +228,8 @@ data Scene = Scene
   , trigger :: TVar Bool
   , readingInFlight :: Gate
   , monitoring :: Behavior ()
+  , monitoringBeside :: Signal.Signal () -> Behavior ()
+  -- ^ With another sensor, to the left of that one.
   }
 
 scene :: (Gate -> Int -> Behavior ()) -> IO Scene
@@ -247,12 +249,14 @@ scene act = do
       recovery = do
         atomically (writeTVar variable False)
         note entries "recovery"
+      beside other = Signal.monitor ((\is _ _ -> is) <$> watchedVar variable <*> other <*> sensing level) recovery task
   pure
     Scene
       { history = entries
       , trigger = variable
       , readingInFlight = entered
-      , monitoring = Signal.monitor (const <$> watchedVar variable <*> sensing level) recovery task
+      , monitoring = beside (pure ())
+      , monitoringBeside = beside
       }
 
 -- | Raises the alarm while a reading is in flight.
@@ -354,3 +358,11 @@ recovering = do
         (end, ran) `shouldBe` case how of
           Faulting -> (FaultedWith (show (Fault "reading")), ["task", "recovery"])
           _ -> (Gave (), ["task", "recovery", "task"])
+
+  it "the fault of any of several readings that stop for a recovery is thrown after it" $ do
+    s <- scene $ \entered n -> when (n == 1) ((open entered >> hang) `onException` throwIO (Fault "reading"))
+    end <- withThread (monitoringBeside s (Signal.polling 3600 (pure ()))) $ \caller -> do
+      raise s
+      awaitEnd caller
+    end `shouldBe` FaultedWith (show (Fault "reading"))
+    notes (history s) `shouldReturn` ["task", "recovery"]

@@ -7,19 +7,22 @@ module Behavior.RuntimeSpec (spec) where
 
 import Control.Concurrent
 import Control.Concurrent.Async (asyncThreadId, poll)
-import Control.Concurrent.STM (newTVarIO, readTVar, retry, writeTVar)
+import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception
 import Control.Monad (replicateM, void)
 import Data.Foldable (for_, traverse_)
 import Data.Maybe (isNothing)
+import GHC.Conc (unsafeIOToSTM)
 #if MIN_VERSION_base(4,18,0)
 import GHC.Conc.Sync (threadLabel)
 #endif
+import System.Mem (performMajorGC)
 import Test.Hspec hiding (parallel)
 
 import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
 import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Runtime
+import Behavior.Internal.Runtime.Property (mistakeOf, testing)
 import Behavior.Internal.Scope hiding (Outcome (..))
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly)
@@ -31,6 +34,7 @@ spec = guarded $ do
   describe "interrupt" interrupting
   describe "A thread" reporting
   describe "atomically" waiting
+  describe "A test of a property" mistakes
   describe "structured" scopes
   describe "StoppedWithFault" pairs
 
@@ -65,6 +69,23 @@ starting = do
     open gate
     _ <- atomically (threadEnd thread)
     liveThreadCount `shouldReturn` before'
+
+  it "no longer counts the thread when it publishes how it ended" $ do
+    before' <- liveThreadCount
+    counted <- newTVarIO (-1)
+    let count _ = unsafeIOToSTM liveThreadCount >>= writeTVar counted
+    thread <- mask_ (startWith Inherited pure count label (pure ()))
+    _ <- atomically (threadEnd thread)
+    readTVarIO counted `shouldReturn` before'
+
+  it "publishes how the thread ended by the transaction that is part of that" $ do
+    gate <- newGate
+    thread <- mask_ (startWith Inherited pure (\_ -> passed gate) label (pure 'a'))
+    awaitIdle (threadId thread)
+    isNothing <$> tryReadEnd thread `shouldReturn` True
+    open gate
+    end <- atomically (threadEnd thread)
+    endingOf end `shouldBe` Gave 'a'
 
   it "labels the thread with its operator and branch" $ do
     show (Label "parallel" "left") `shouldBe` "parallel: left"
@@ -171,6 +192,16 @@ waiting = do
         atomically (writeTVar var True)
         awaitOver (asyncThreadId caller)
 
+  it "is repeated inside awaitUninterruptibly each time that GHC takes the thread for deadlocked" $ do
+    entries <- newLog
+    let deadlocked = hang `catch` \BlockedIndefinitelyOnSTM -> note entries "deadlocked"
+    _ <- forkIO $ do
+      thread <- mask_ (start label (deadlocked >> deadlocked >> deadlocked))
+      void (awaitUninterruptibly (atomically (threadEnd thread)))
+      note entries "awaited"
+    eventually (performMajorGC >> elem "awaited" <$> notes entries)
+    notes entries `shouldReturn` ["deadlocked", "deadlocked", "deadlocked", "awaited"]
+
   it "has a checkpoint where a cancellation arrives that was masked until then" $ do
     ready <- newGate
     mayGo <- newGate
@@ -186,6 +217,19 @@ waiting = do
         open mayGo
         awaitEnd caller
     (end, done) `shouldBe` (Gave (CancelledBy (show (Cancel "caller"))), ["masked"])
+
+mistakes :: Spec
+mistakes = do
+  it "keeps the first mistake, also when another property was tested within it" $ do
+    kept <- testing $ \property -> do
+      testing (\_ -> pure ())
+      for_ ["first", "second"] $ \mistake -> currentProperty >>= traverse_ (`keepMistake` Fault mistake)
+      mistakeOf property
+    fmap show kept `shouldBe` Just (show (Fault "first"))
+
+  it "has no property after its end" $ do
+    testing (\_ -> pure ())
+    isNothing <$> currentProperty `shouldReturn` True
 
 scopes :: Spec
 scopes = do
@@ -319,6 +363,33 @@ scopes = do
         pass inside
         throwing (asyncThreadId caller) deadlock
         awaitEnd caller `shouldReturn` FaultedWith (show (Fault "branch"))
+
+  it "does not lose an exception that arrives when a branch has faulted" $
+    void . explore (randomly 1000) $ \simulated -> do
+      let handled = (both (sleep 1 >> throwIO (Fault "branch")) (sleep 2) `catch` \(Fault _) -> pure ()) >> sleep 10
+      run <- simulated (parallel handled (sleep 1))
+      finished run `shouldBe` 1
+
+  it "can be interrupted by a cleanup also after GHC has taken the caller for deadlocked" $ do
+    gates@[inside, inside', mayEnd, mayThrow] <- replicateM 4 newGate
+    cleaning <- newGate
+    caller <- newEmptyMVar
+    let operator = inScope $ \scope -> do
+          myThreadId >>= putMVar caller
+          _ <-
+            branch scope "first" (uninterruptibly (open inside >> hang) (open cleaning >> pass mayEnd))
+              :: IO (Branch ())
+          _ <-
+            branch scope "second" $
+              uninterruptibly (open inside' >> hang) (pass mayThrow >> readMVar caller >>= (`throwTo` Cancel "cleanup"))
+              :: IO (Branch ())
+          traverse_ pass (take 2 gates)
+          pure (pure ())
+    withThread operator $ \thread -> do
+      pass cleaning
+      throwing (asyncThreadId thread) BlockedIndefinitelyOnSTM
+      openAll [mayEnd, mayThrow]
+      awaitEnd thread `shouldReturn` CancelledBy (show (Cancel "cleanup"))
 
   for_ [("interrupts", 1), ("recovers first", 0)] $ \(manner, start') ->
     it ("stops all threads of a monitor that " ++ manner ++ " and is cancelled while it makes its stop requests") $

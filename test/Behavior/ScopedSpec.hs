@@ -92,6 +92,16 @@ spec = guarded $ do
     faults ["first", "second", "third"] (pure ()) `shouldReturn` FaultedWith (show (Fault "first"))
     faults ["first", "second"] (throwIO (Fault "scoped")) `shouldReturn` FaultedWith (show (Fault "scoped"))
 
+  it "prefers the fault of an earlier fork also when children that have ended were forgotten meanwhile" $ do
+    let faulty gate name' = (open gate >> hang) `onException` throwIO (Fault name') :: IO ()
+    end <- ending . scoped $ \nursery -> do
+      for_ ["first", "second"] $ \name' -> do
+        gate <- newGate
+        _ <- fork nursery (faulty gate name')
+        pass gate
+      replicateM_ 14 (fork nursery (pure ()) >>= atomically . await)
+    end `shouldBe` FaultedWith (show (Fault "first"))
+
   it "is closed outside: to fork there is a fault, and nothing runs" $ do
     (end, done) <- observing $ \entries -> do
       nursery <- scoped pure
@@ -135,6 +145,13 @@ spec = guarded $ do
         _ <- fork nursery (forever (fork nursery (pure ()))) :: IO (Child ())
         yielding n
       end `shouldBe` Gave ()
+
+  it "fails to fork only what has not run, whenever the scope is stopped" $
+    void . explore (randomly 1000) $ \simulate' -> do
+      entries <- newLog
+      let body nursery = void (fork nursery (note entries "ran")) `catch` \(_ :: Failed) -> note entries "failed"
+      _ <- simulate' (scoped body ||| pure ())
+      notes entries >>= (`shouldSatisfy` (< 2) . length)
 
   it "loses no fault of a child, also when it is stopped just as it forgets the children that have ended" $
     void . explore (randomly 300) $ \simulate' -> do

@@ -55,6 +55,7 @@ receiving = do
     let found = [spanName s | Began s <- names]
     map (take 5) (take 1 found) `shouldBe` ["long "]
     map length (take 1 found) `shouldSatisfy` all (< 20000)
+    map (reverse . take 4 . reverse) (take 1 found) `shouldBe` [" ..."]
     drop 1 found
       `shouldBe` [ "<its text throws an exception>"
                  , "of a type that is asynchronous: <its text throws an exception>"
