@@ -91,7 +91,8 @@
 -- > (extend arm >> takePicture) `finally` cleanupWithin 3 (park arm)
 --
 -- A behaviour that may hang where nothing can interrupt it, so that its operator would wait for ever,
--- can be abandoned: 'Behavior.Time.abandoning' is the only way out of promises 1, 2 and 4.
+-- can be abandoned: 'Behavior.Time.abandoning' is the only way out of promises 1, 2 and 4. (What else can
+-- outlive an operator is no behaviour: a sink that is blocked at the end of its trace, see "Behavior.Trace".)
 --
 -- == What GHC limits
 --
