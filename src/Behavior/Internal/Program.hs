@@ -35,10 +35,11 @@ import Behavior.Internal.Scope
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
 -- instead of the exit. A signal that comes too late to cancel the behaviour has the effect that it
 -- had before: the handler that was installed then is called, and awaited for at most a second, before
--- this returns. So no first signal that comes while this runs is without effect. (After the
--- behaviour, these signals have the effect that they had before it. If that was the
--- default, a handler of this library does it, so 'System.Posix.Signals.installHandler'
--- returns that handler. GHC's own handler of SIGINT may be called too late, when the program is ending.)
+-- this returns. So no first signal that comes while this runs is without effect. But a handler of another
+-- kind than 'System.Posix.Signals.Catch' is not awaited (@CatchOnce@, @CatchInfo@, @CatchInfoOnce@, and GHC's own of
+-- SIGINT): it is called some time later, and not at all if the program has ended by then. (After the
+-- behaviour, these signals have the effect that they had before it. If that was the default, a handler of
+-- this library does it, so 'System.Posix.Signals.installHandler' returns that handler.)
 --
 -- Call it in the thread of @main@. In a thread of 'Control.Concurrent.forkIO' the exit code
 -- is thrown in that thread: the behaviour is cancelled, and the process goes on. When
