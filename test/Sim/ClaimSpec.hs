@@ -146,6 +146,13 @@ names = do
     let door = recordOf [("open", AnActionOn), ("open front", AnAction)] [call "open \"front\""]
     wrong (verdict (never (startOf "open front")) door) `shouldBe` []
 
+  it "are at least one" $ do
+    evaluate (countOf (anyOf []) world) `shouldThrow` \(ErrorCall why) -> "anyOf: at least one moment" `isInfixOf` why
+    mock <- newMock
+    begin mock
+    for_ [mempty, mconcat [mempty, mempty]] $ \claim ->
+      (mock `shouldRecord` claim) `shouldThrow` \(ErrorCall why) -> "claims nothing" `isInfixOf` why
+
   it "are said to be what the functions of the world have made" $ do
     mock <- newMock
     _ <- condition mock "c" [(0, 'x')]
@@ -172,6 +179,10 @@ names = do
     , ("open front door", "open [\"front door\"]")
     , ("open (-3)", "open -3")
     , ("open 3", "open 3.0")
+    , ("open (1, 2)", "open (1,2)")
+    , ("open At {x=1,y=2}", "open At {x = 1, y = 2}")
+    , ("open 3", "open Just 3")
+    , ("open -3", "open Just (-3)")
     ]
   otherArguments =
     [ ("open \"cellar\"", ["open \"front\""])
@@ -180,12 +191,14 @@ names = do
     , ("open North", ["open Going North"])
     , ("open 3", ["open 13"])
     , ("open '+'", ["open '-'"])
+    , ("open '('", ["open ')'"])
     , ("open 'x'", [])
     ]
   found `refusedAs` text = found `shouldSatisfy` either (text `isInfixOf`) (const False)
   unknown =
     [ never (startOf "drvie")
     , startOf "drvie" `comesBefore` startOf "open"
+    , never (startOf "open ")
     , never (startOf "open" `during` being "lwo" True)
     , never (startOf "low 'x'")
     ]

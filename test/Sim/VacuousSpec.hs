@@ -6,8 +6,8 @@ module Sim.VacuousSpec (spec) where
 
 import Control.Concurrent (threadDelay)
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
-import Control.Exception (ErrorCall (..), finally)
-import Control.Monad (void, when)
+import Control.Exception (AsyncException (ThreadKilled), ErrorCall (..), finally, throwIO)
+import Control.Monad (forever, void, when)
 import Data.Foldable (for_)
 import Data.IORef (modifyIORef, newIORef, readIORef)
 import Data.List (isInfixOf)
@@ -21,7 +21,7 @@ import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
 import Behavior.Sim.QuickCheck (underSchedules)
-import Behavior.Time (cleanupWithin, timeout, timeoutAt)
+import Behavior.Time (checkpoint, cleanupWithin, timeout, timeoutAt)
 import Behavior.Trace (named)
 import Support (guarded)
 
@@ -128,6 +128,12 @@ explorations = do
       `shouldFailWith` "simulates only once"
   it "fails, when its property returns an error that nothing has evaluated" $
     tryExplore (randomly 2) (\simulating -> error "late" <$ simulating (pure ())) `shouldFailWith` "late"
+  it "fails, when a claim that is checked inside of a run does not hold, also if the property ignores how that ended" $
+    for_ [id, (? pure ()), void . tryAny] $ \ignoring -> do
+      let property simulating = do
+            (world, drive, _) <- rover
+            void . simulating . ignoring $ drive >> (world `shouldRecord` never (startOf "drive"))
+      tryExplore (randomly 2) property `shouldFailWith` "never \"drive\" begins"
   it "is refused, when its limit is negative" $
     simulateWith defaultSimOptions {livelockLimit = -1} (pure ()) `shouldThrow` saying "livelockLimit"
   it "is refused, when its property simulates nothing under one of the schedules" $ do
@@ -229,6 +235,26 @@ coverage = do
     report <- explore (randomly 3) $ \simulated ->
       void (simulated (Signal.rSelect (pure True) (pure ()) (Signal.monitor (pure False) (pure ()) (pure ()))))
     reportNeverStarted report `shouldBe` ["rSelect: right"]
+  it "has how runs have ended, but for those that have returned" $ do
+    let ends mission = explore (randomly 20 `endingAt` 9) (\simulated -> void (simulated mission))
+        table =
+          [ (fail "broken", ("faulted", 20))
+          , (failed, ("failed", 20))
+          , (throwIO ThreadKilled, ("cancelled", 20))
+          , (Signal.waitUntil (pure False), ("deadlocked", 20))
+          , (sleep 10, ("out of time", 20))
+          ]
+    for_ table $ \(mission, end) -> do
+      report <- ends mission
+      reportEnds report `shouldBe` [end]
+      show report `shouldContain` ("; 20 " ++ fst end)
+    livelocked <- explore (replaying NonPreemptive) $ \simulated -> void (simulated (forever checkpoint))
+    reportEnds livelocked `shouldBe` [("livelocked", 1)]
+    -- The right branch fails, unless it is stopped before.
+    some <- ends (pure () ||| failed)
+    map fst (reportEnds some) `shouldBe` ["failed"]
+    map snd (reportEnds some) `shouldSatisfy` all (< 20)
+    (reportEnds <$> ends (sleep 8)) `shouldReturn` []
   it "counts one schedule as one" $ do
     report <- explore (replaying NonPreemptive) (\simulated -> void (simulated (pure ())))
     show report `shouldBe` "1 schedule of 1 point in all"

@@ -17,6 +17,7 @@ module Behavior.Internal.Mock.Claim
     -- * Checking
   , holds
   , verdict
+  , claimsNothing
   , premisesIn
   ) where
 
@@ -110,7 +111,7 @@ eventually = withinSeconds (1 / 0)
 -- @since 0.1.0.0
 withinSeconds :: Seconds -> Moment -> Claim
 withinSeconds limit m
-  | limit >= 0 = claimOf (term ++ momentWords m) m $ \record (Origin _ since) found -> case found of
+  | limit >= 0 = claimOf (term ++ momentWords m) [] m $ \record (Origin _ since) found -> case found of
       []
         | limit < 1 / 0 && since + limit - tolerance > recordEnd record ->
             Just ("it never came (the record ends at " ++ inSeconds (recordEnd record) ++ ", before the limit)", [])
@@ -128,20 +129,18 @@ withinSeconds limit m
 --
 -- @since 0.1.0.0
 never :: Moment -> Claim
-never m = (claimOf ("never " ++ momentWords m) m check) {premises = momentPremises m}
- where
-  check _ _ found = case found of
-    [] -> Nothing
-    row : _ -> Just ("it was so at " ++ inSeconds (time row), [row])
+never m = claimOf ("never " ++ momentWords m) (momentPremises m) m $ \_ _ found -> case found of
+  [] -> Nothing
+  row : _ -> Just ("it was so at " ++ inSeconds (time row), [row])
 
 -- | It happens exactly the given number of times.
 --
 -- @since 0.1.0.0
 exactly :: Int -> Moment -> Claim
-exactly n m =
-  (claimOf ("exactly " ++ times n ++ " " ++ momentWords m) m check) {premises = if n == 0 then momentPremises m else []}
+exactly n m = claimOf ("exactly " ++ times n ++ " " ++ momentWords m) presupposed m $ \_ _ found ->
+  if length found == n then Nothing else Just ("it was so " ++ times (length found), found)
  where
-  check _ _ found = if length found == n then Nothing else Just ("it was so " ++ times (length found), found)
+  presupposed = if n == 0 then momentPremises m else []
   times 1 = "once"
   times many = show many ++ " times"
 
@@ -153,7 +152,7 @@ exactly n m =
 --
 -- @since 0.1.0.0
 always :: Interval -> Claim
-always s = simple ("always " ++ intervalWords s) (intervalNeeds s) $ \record (Origin origin since) ->
+always s = simple ("always " ++ intervalWords s) (intervalNeeds s) [] $ \record (Origin origin since) ->
   let ranges = intervalRanges s record
       rows = numbered record
       end = Place (recordEnd record) After 0
@@ -188,15 +187,14 @@ always s = simple ("always " ++ intervalWords s) (intervalNeeds s) $ \record (Or
 --
 -- @since 0.1.0.0
 comesBefore :: Moment -> Moment -> Claim
-comesBefore a b =
-  (simple (momentWords a ++ " before " ++ momentWords b) (momentNeeds a ++ momentNeeds b) check) {premises = [premiseOf b]}
+comesBefore a b = simple words' (momentNeeds a ++ momentNeeds b) [premiseOf b] $ \record (Origin origin _) ->
+  let after m = filter ((> origin) . fst) (occurrences m record)
+   in case (after a, after b) of
+        (_, []) -> Nothing
+        ((n, _) : _, (k, _) : _) | n < k -> Nothing
+        (_, row : _) -> Just ("the second came at " ++ inSeconds (time row) ++ ", without the first", [row])
  where
-  check record (Origin origin _) =
-    let after m = filter ((> origin) . fst) (occurrences m record)
-     in case (after a, after b) of
-          (_, []) -> Nothing
-          ((n, _) : _, (k, _) : _) | n < k -> Nothing
-          (_, row : _) -> Just ("the second came at " ++ inSeconds (time row) ++ ", without the first", [row])
+  words' = momentWords a ++ " before " ++ momentWords b
 
 infix 7 `comesBefore`
 
@@ -226,14 +224,15 @@ whenever m claim =
     Premise (words'' ++ " after " ++ momentWords m) (\record -> any (comes' record . snd) . after record)
   words' then' = "whenever " ++ momentWords m ++ ", " ++ then'
 
--- | A claim that is not made of others: its words, what it needs, and why it does not hold, with the
--- lines that show it.
-simple :: String -> [Need] -> (Record -> Origin -> Maybe (String, [Line])) -> Claim
-simple words' needs check = Claim words' needs [] (\record origin -> uncurry (Violation words') <$> check record origin)
+-- | A claim that is not made of others: its words, what it needs and presupposes, and why it does not hold, with
+-- the lines that show it.
+simple :: String -> [Need] -> [Premise] -> (Record -> Origin -> Maybe (String, [Line])) -> Claim
+simple words' needs presupposed check =
+  Claim words' needs presupposed (\record origin -> uncurry (Violation words') <$> check record origin)
 
 -- | A claim about when a moment occurs.
-claimOf :: String -> Moment -> (Record -> Origin -> [Line] -> Maybe (String, [Line])) -> Claim
-claimOf words' m check = simple words' (momentNeeds m) $ \record origin@(Origin after _) ->
+claimOf :: String -> [Premise] -> Moment -> (Record -> Origin -> [Line] -> Maybe (String, [Line])) -> Claim
+claimOf words' presupposed m check = simple words' (momentNeeds m) presupposed $ \record origin@(Origin after _) ->
   check record origin (filter ((> after) . fst) (occurrences m record))
 
 -- | Whether a claim holds. With hspec: @record \`shouldSatisfy\` holds claim@.
@@ -268,6 +267,10 @@ verdict claim record = case unfitIn record (claimNeeds claim) of
   entries = recordEntries record
   refuted which why rows = Left (unlines (("This does not hold: " ++ which ++ ".") : why : rows))
   capital why = map toUpper (take 1 why) ++ drop 1 why
+
+-- | Whether it is 'mempty'.
+claimsNothing :: Claim -> Bool
+claimsNothing = null . claimWords
 
 -- | What has to come, or the claim holds whatever happens: in words, and whether it has come in this record.
 premisesIn :: Record -> Claim -> [(String, Bool)]

@@ -174,13 +174,14 @@ isEnd kind = case kind of
   Stops -> True
   _ -> False
 
--- | Any of these.
+-- | Any of these. Of no moments it is an 'Control.Exception.ErrorCall': none of them could ever come.
 --
 -- >>> countOf (anyOf [startOf "drive", startOf "charge"]) record
 -- 2
 --
 -- @since 0.1.0.0
 anyOf :: [Moment] -> Moment
+anyOf [] = errorWithoutStackTrace "anyOf: at least one moment"
 anyOf ms =
   Moment
     { momentWords = intercalate " or " (map momentWords ms)

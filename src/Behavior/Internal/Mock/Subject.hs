@@ -114,17 +114,20 @@ unfit world shown = listToMaybe . mapMaybe unfitNeed
 
 -- | Whether a name is that of the subject; of an action with an argument also with an argument.
 isCalled :: (String, SubjectKind) -> String -> Bool
-isCalled (known, kind) name = known == name || (kind == AnActionOn && (known ++ " ") `isPrefixOf` name)
+isCalled (known, kind) name =
+  known == name || (kind == AnActionOn && any (any (/= ' ')) (stripPrefix (known ++ " ") name))
 
--- | Whether the first is the second, as it is shown, with other quotes or parentheses, or as a number of another
--- type; or without quotes, also without the constructor before it.
+-- | Whether the first is the second, as it is shown, with other quotes, brackets or blanks, or as a number of another
+-- type; or without 'Just'; or without the quotes, also without the constructor before them.
 rewrites :: String -> String -> Bool
-given `rewrites` shown = bare given == bare shown || isSameNumber || (not (quoted given) && quoted shown && isEnd)
+given `rewrites` shown = not (null (bare given)) && (bare given == bare shown || isSameNumber || lacksBeginning)
  where
-  isEnd = bare given `isSuffixOf` bare shown
+  lacksBeginning =
+    bare given `isSuffixOf` bare shown
+      && (take 1 (bare shown) == ["Just"] || (not (quoted given) && quoted shown))
   -- (The first digit is looked at first, since 'reads' takes long.)
   isSameNumber =
     take 1 given == take 1 shown && or [a == b | (a, "") <- reads given, (b, "") <- reads shown :: [(Double, String)]]
   bare = words . map (\c -> if c `elem` marks then ' ' else c)
   quoted = any (`elem` "\"'")
-  marks = "\"'()[]"
+  marks = "\"'()[]{},="

@@ -36,7 +36,7 @@ import Data.IORef
 import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Mock.Claim (Claim, premisesIn, verdict)
+import Behavior.Internal.Mock.Claim (Claim, claimsNothing, premisesIn, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime
@@ -227,8 +227,11 @@ happened mock = do
 -- | Throws a 'BrokenClaim' with the reason, unless the claim holds for the record. Use it
 -- like an expectation of hspec.
 --
--- In an exploration it is also kept whether that has come without which the claim holds whatever happens
--- ('Behavior.Sim.reportNeverCame').
+-- [Fault] Throws an 'ErrorCall' if there is no record ('happened'), or no claim ('mempty').
+--
+-- In an exploration a claim that does not hold fails the property, also if it was checked inside of the run, and
+-- whatever catches the exception there. And it is kept whether that has come without which the claim holds
+-- whatever happens ('Behavior.Sim.reportNeverCame').
 --
 -- >>> begin mock
 -- >>> mock `shouldRecord` eventually (noted "all is well")
@@ -240,8 +243,14 @@ happened mock = do
 shouldRecord :: Mock -> Claim -> IO ()
 shouldRecord mock claim = do
   record <- happened mock
-  either (throwIO . BrokenClaim) pure (verdict claim record)
   property <- ownProperty mock
+  when (claimsNothing claim) . throwIO . ErrorCall $
+    "this claims nothing (mempty, or mconcat of no claims), so it would hold whatever happened"
+  for_ (either Just (const Nothing) (verdict claim record)) $ \why -> do
+    -- Inside of a run this exception is only how a behaviour ends.
+    run <- simulatedRun
+    when (isJust run) (mapM_ (`keepMistake` BrokenClaim why) property)
+    throwIO (BrokenClaim why)
   for_ property (`keepPremises` premisesIn record claim)
 
 infix 1 `shouldRecord`

@@ -48,6 +48,8 @@ instance Exception Unrepeatable
 -- | One run of the property: its exception, and the simulated run.
 data Trial = Trial
   { thrown :: Maybe SomeException
+  , otherEnd :: Maybe String
+  -- ^ How the run ended, if it did not return a result.
   , deviations :: [(Int, Int)]
   -- ^ The choices that deviate from the non-preemptive schedule.
   , happened :: [Step]
@@ -64,6 +66,7 @@ noTrial :: Trial
 noTrial =
   Trial
     { thrown = Nothing
+    , otherEnd = Nothing
     , deviations = []
     , happened = []
     , traceOfRun = []
@@ -72,22 +75,37 @@ noTrial =
     , claimed = Map.empty
     }
 
--- | The runs so far: how many, their scheduling points in all, and what they have reached.
-data Tally = Tally !Int !Int !Coverage
+-- | The runs so far.
+data Tally = Tally
+  { tried :: !Int
+  , points :: !Int
+  , otherEnds :: !(Map String Int)
+  -- ^ How they ended that did not return.
+  , covered :: !Coverage
+  }
+
+noRun :: Tally
+noRun = Tally {tried = 0, points = 0, otherEnds = Map.empty, covered = nothing}
 
 counting :: Tally -> Trial -> Tally
-counting (Tally n total covered) t =
-  Tally (n + 1) (total + size t) (withRun (traceOfRun t) (reached t) (claimed t) covered)
+counting before t =
+  Tally
+    { tried = tried before + 1
+    , points = points before + size t
+    , otherEnds = maybe id (\end -> Map.insertWith (+) end 1) (otherEnd t) (otherEnds before)
+    , covered = withRun (traceOfRun t) (reached t) (claimed t) (covered before)
+    }
 
 reported :: Bool -> Tally -> Report
-reported all' (Tally n total covered) =
+reported all' Tally {tried = n, points = total, otherEnds = ends, covered = covered'} =
   Report
     { reportSchedules = n
     , reportComplete = all'
     , reportPoints = total
-    , reportStarted = started covered
-    , reportNeverStarted = neverStarted covered
-    , reportNeverCame = neverCame covered
+    , reportEnds = Map.toList ends
+    , reportStarted = started covered'
+    , reportNeverStarted = neverStarted covered'
+    , reportNeverCame = neverCame covered'
     }
 
 -- | Runs a property under many schedules, until one fails.
@@ -158,15 +176,14 @@ tryExplore plan property = case planSearch plan of
       }
   try' chooser' = tryRun o chooser' property
   refused why n = throwIO (ErrorCall ("explore: " ++ why ++ ", and not " ++ show n))
-  none = Tally 0 0 nothing
 
   only s onFailure = do
     t <- try' (policy s)
     case thrown t of
-      Nothing -> pure (Right (reported True (counting none t)))
+      Nothing -> pure (Right (reported True (counting noRun t)))
       Just e -> Left <$> onFailure e t
 
-  randomSearch n seed = go 1 none
+  randomSearch n seed = go 1 noRun
    where
     go i !before
       | i > n = pure (Right (reported True before))
@@ -178,7 +195,7 @@ tryExplore plan property = case planSearch plan of
 
   -- The queue is a stack. It holds the alternatives to the decisions of the last schedule,
   -- and to those of the prefixes that this schedule continues.
-  fullSearch k limit = go 1 none (emptyPrefix k) []
+  fullSearch k limit = go 1 noRun (emptyPrefix k) []
    where
     go :: Int -> Tally -> Prefix -> [Alternatives] -> IO (Either Counterexample Report)
     go n !before prefix others
@@ -260,7 +277,8 @@ tryRun o choosing property = testing $ \this -> do
                   _ -> []
             writeIORef made . Just $
               noTrial
-                { deviations = deviating
+                { otherEnd = otherEndOf (outcome run)
+                , deviations = deviating
                 , happened = steps run
                 , traceOfRun = events run
                 , size = runPoints run

@@ -103,7 +103,8 @@ replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 endingAt :: Plan -> Seconds -> Plan
 endingAt whole end = whole {planOptions = (planOptions whole) {endAt = end}}
 
--- | What was explored. Its text has the numbers, and what no schedule has started, or has brought about.
+-- | What was explored. Its text has the numbers, and how runs have ended that did not return, and what
+-- no schedule has started, or has brought about.
 --
 -- @since 0.1.0.0
 data Report = Report
@@ -113,6 +114,9 @@ data Report = Report
   -- ^ Whether those were all schedules of the plan.
   , reportPoints :: !Int
   -- ^ How many scheduling points they had, in all.
+  , reportEnds :: [(String, Int)]
+  -- ^ How many runs have ended in other ways than by returning a result: @("faulted", 20)@. (What a property does
+  -- not look at does not fail it: see 'Behavior.Sim.well'.)
   , reportStarted :: [String]
   -- ^ The names of what was started under at least one schedule: behaviours that have a name
   -- ('Behavior.Trace.named'), scripted actions, and branches, as in @"monitor: recovery"@ or
@@ -136,6 +140,7 @@ instance Show Report where
   show r =
     counted "schedule" (reportSchedules r) ++ " of " ++ counted "point" (reportPoints r) ++ " in all"
       ++ (if reportComplete r then "" else ", and there are more")
+      ++ listed "; " [show n ++ " " ++ end | (end, n) <- reportEnds r]
       ++ listed "; never started: " (map show (reportNeverStarted r))
       ++ listed "; never came: " (reportNeverCame r)
    where

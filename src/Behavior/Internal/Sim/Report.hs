@@ -8,6 +8,7 @@
 module Behavior.Internal.Sim.Report
   ( explain
   , well
+  , otherEndOf
   , renderSteps
   , ofThreads
   , mentioning
@@ -79,6 +80,24 @@ well run = case (outcome run, leakedThreads run) of
   (Returned a, []) -> pure a
   (Returned _, left) -> throwIO (ErrorCall ("it returned, but these threads were left running: " ++ commas left))
   (other, _) -> throwIO (ErrorCall (explain other))
+
+-- | How a run ended, in a word or two, if it did not return.
+otherEndOf :: Outcome a -> Maybe String
+otherEndOf = \case
+  Returned _ -> Nothing
+  Threw e
+    | isFailure e -> Just "failed"
+    | isCancellation e -> Just "cancelled"
+    | otherwise -> Just "faulted"
+  Deadlock _ -> Just "deadlocked"
+  Livelock _ _ -> Just "livelocked"
+  OutOfTime _ -> Just "out of time"
+  BlockedOutside _ _ -> invalid
+  ExternalWakeup _ -> invalid
+  TooSlow _ _ -> invalid
+  ScheduleMismatch _ -> invalid
+ where
+  invalid = Just "not valid"
 
 listed :: String -> [Waiting] -> String
 listed title = intercalate "\n  " . (title :) . map (\(Waiting who what) -> show who ++ " waits for " ++ what)
