@@ -118,7 +118,7 @@ underOrders r act = do
       underOrders r act
  where
   mode = Signal.staleAfter 1 (Signal.polling 0.5 (askMode r))
-  linkIsBack = Signal.waitUntil (True <$ mode) ? (sleep 1 >> linkIsBack)
+  linkIsBack = void (Signal.read mode) ? (sleep 1 >> linkIsBack)
 
 tryFailure :: Behavior a -> Behavior (Either BehaviorFailed a)
 tryFailure = try
@@ -171,7 +171,7 @@ photograph r beds bed = shot ? attempt 2 (sleep 1 >> shot)
 -- | Drives to the place, through the door if it is in the other house.
 drive :: Rover -> Place -> Behavior ()
 drive r place = do
-  here <- Signal.switch (position r) pure -- the current position
+  here <- Signal.read (position r)
   unless (here == place) $
     if houseOf here == houseOf place
       then move

@@ -49,10 +49,14 @@ module Behavior.Signal
   , switch
   , teleoReactive
 
-    -- ** Waiting for a condition, and requiring one
+    -- ** Reading, waiting for a condition, and requiring one
+  , read
   , waitUntil
+  , waitUntilJust
   , whileHolding
   ) where
+
+import Prelude ()
 
 import Behavior.Internal.Reactive.Operators
 import Behavior.Internal.Reactive.Pausing

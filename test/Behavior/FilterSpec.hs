@@ -39,15 +39,15 @@ hysteresis :: Spec
 hysteresis = do
   it "keeps its initial state between the thresholds" $
     for_ [False, True] $ \initial ->
-      Signal.switch (Signal.hysteresis initial 20 80 (pure (50 :: Int))) pure `shouldReturn` initial
+      Signal.read (Signal.hysteresis initial 20 80 (pure (50 :: Int))) `shouldReturn` initial
 
   it "keeps its state from one operator to the next, where it is shared" $ do
     level <- newTVarIO (90 :: Int)
     Signal.withShared (Signal.hysteresis False 20 80 (watchedVar level)) $ \charged -> do
-      Signal.switch charged pure `shouldReturn` True
+      Signal.read charged `shouldReturn` True
       atomically (writeTVar level 50)
-      Signal.switch charged pure `shouldReturn` True
-    Signal.switch (Signal.hysteresis False 20 80 (watchedVar level)) pure `shouldReturn` False
+      Signal.read charged `shouldReturn` True
+    Signal.read (Signal.hysteresis False 20 80 (watchedVar level)) `shouldReturn` False
 
   prop "is a fold over the values that were read" $
     forAll ((,) <$> thresholds <*> listOf1 (choose (0, 10))) $ \((low, high), levels) ->
@@ -135,7 +135,7 @@ debounce = do
 
   it "decides on the first reading, however long the period" $
     replicateM_ 200 $
-      Signal.switch (Signal.debounce (1 / 0) once) pure `shouldReturn` 1
+      Signal.read (Signal.debounce (1 / 0) once) `shouldReturn` 1
 
   it "accepts a change once it has lasted for the duration, and no sooner" $ do
     condition <- newTestCondition True

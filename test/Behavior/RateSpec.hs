@@ -179,7 +179,7 @@ replanning = do
     standing (\wanted plan path fly -> forever (Signal.waitUntil wanted >> plan) ||| Signal.switch path fly)
       `shouldReturn` 5
   it "stands still during each, if planning interrupts the flight" $
-    standing (\wanted plan path fly -> Signal.monitor wanted plan (Signal.switch path pure >>= fly)) `shouldReturn` 15
+    standing (\wanted plan path fly -> Signal.monitor wanted plan (Signal.read path >>= fly)) `shouldReturn` 15
 
 -- | For how many of 30 seconds the drone does not fly.
 standing :: (Signal Bool -> Behavior () -> Signal Int -> (Int -> Behavior ()) -> Behavior ()) -> IO Seconds

@@ -5,6 +5,7 @@
 module Behavior.ReactiveSpec (spec) where
 
 import Control.Concurrent (yield)
+import Control.Concurrent.Async (wait)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (replicateM_, unless, void)
@@ -15,10 +16,11 @@ import Test.Hspec hiding (after, around, before)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (ioProperty, (===))
 
-import Behavior (failWith)
+import Behavior (Behavior, failWith)
 import Behavior.Internal.Runtime (atomically, now, sleep)
+import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (finished, simulate)
+import Behavior.Sim (Outcome (Returned), Run (finished, outcome), simulate)
 import Behavior.Time (timeout)
 import Support
 import Watched
@@ -29,7 +31,16 @@ spec = guarded $ do
   describe "rSelect" selecting
   describe "switch" switching
   describe "teleoReactive" rules
-  describe "waitUntil" waiting
+  describe "read" readingOnce
+  describe "waitUntil" (waiting Signal.waitUntil)
+  describe "waitUntilJust" $ do
+    waiting (Signal.waitUntilJust . fmap (\holds -> if holds then Just () else Nothing))
+    it "returns the value, which need not have an equality" $ do
+      found <- newTVarIO Nothing
+      withThread (Signal.waitUntilJust (watchedVar found)) $ \caller -> do
+        stillRunning caller
+        atomically (writeTVar found (Just (+ (1 :: Int))))
+        (($ 1) <$> wait caller) `shouldReturn` 2
   describe "whileHolding" holding
 
 laws :: Spec
@@ -250,11 +261,11 @@ rules = do
       set condition SensorFailure
       awaitEnd caller `shouldReturn` FailedWith "FailedBecause \"the sensor\""
 
-waiting :: Spec
-waiting = do
+waiting :: (Signal Bool -> Behavior ()) -> Spec
+waiting waitUntil = do
   it "returns when the condition holds, and not before" $ do
     condition <- newTestCondition False
-    withThread (Signal.waitUntil (watched condition)) $ \caller -> do
+    withThread (waitUntil (watched condition)) $ \caller -> do
       stillRunning caller
       set condition (Value True)
       awaitEnd caller `shouldReturn` Gave ()
@@ -262,15 +273,35 @@ waiting = do
   for_ [SensorFailure, SensorFault, NoValue] $ \newState ->
     it ("ends, instead of waiting on, when the condition's state is " ++ show newState) $ do
       condition <- newTestCondition False
-      withThread (Signal.waitUntil (watched condition)) $ \caller -> do
+      withThread (waitUntil (watched condition)) $ \caller -> do
         stillRunning caller
         set condition newState
         awaitEnd caller >>= (`shouldSatisfy` (/= Gave ()))
 
   it "can be cancelled" $ do
     condition <- newTestCondition False
-    cancelling (Signal.waitUntil (watched condition)) (pure ())
+    cancelling (waitUntil (watched condition)) (pure ())
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
+
+readingOnce :: Spec
+readingOnce = do
+  it "gives the value that there is, by one reading of a sensor" $ do
+    counted <- newSensor pure
+    run <- simulate (Signal.read ((,) <$> Signal.polling 60 (sensor counted) <*> pure 'a'))
+    (finished run, [value | Returned value <- [outcome run]]) `shouldBe` (0, [(1, 'a')])
+    readings counted `shouldReturn` 1
+
+  it "waits for the first value" $ do
+    found <- newTVarIO Nothing
+    withThread (Signal.read (Signal.watching (readTVar found >>= maybe retry pure))) $ \caller -> do
+      stillRunning caller
+      atomically (writeTVar found (Just 'a'))
+      awaitEnd caller `shouldReturn` Gave 'a'
+
+  it "fails and faults as the signal does" $
+    for_ [throwIO (Failure "reading"), throwIO (Fault "reading")] $ \act -> do
+      end <- ending (Signal.read (Signal.polling 60 act) :: IO ())
+      ending act `shouldReturn` end
 
 holding :: Spec
 holding =

@@ -55,13 +55,13 @@ several = do
   prop "pure ones is the function applied to their values" $ \f x y ->
     let g = if f then (+) else (-) :: Int -> Int -> Int
         constant = pure :: Int -> Signal.Signal Int
-     in ioProperty $ (=== g x y) <$> Signal.switch (g <$> constant x <*> constant y) pure
+     in ioProperty $ (=== g x y) <$> Signal.read (g <$> constant x <*> constant y)
 
   it "has a value when each has one" $ do
     first <- newTVarIO Nothing
     second <- newTVarIO Nothing
     let given variable = Signal.watching (readTVar variable >>= maybe retry pure)
-    withThread (Signal.switch ((,) <$> given first <*> given second) pure) $ \caller -> do
+    withThread (Signal.read ((,) <$> given first <*> given second)) $ \caller -> do
       stillRunning caller
       atomically (writeTVar first (Just 'a'))
       stillRunning caller

@@ -15,12 +15,16 @@ module Behavior.Internal.Reactive.Operators
   , switch
   , teleoReactive
 
-    -- * Waiting for a condition, and requiring one
+    -- * Reading, waiting for a condition, and requiring one
+  , read
   , waitUntil
+  , waitUntilJust
   , whileHolding
   ) where
 
 import Data.List (findIndex, intercalate, nub)
+import Data.Maybe (isNothing)
+import Prelude hiding (read)
 
 import Behavior.Internal.Failure (Behavior, failWith)
 import Behavior.Internal.Reactive.Engine
@@ -170,6 +174,24 @@ teleoReactive rules = react "teleoReactive" (map Just [0 .. length rules - 1]) f
   firstHolding = findIndex id <$> traverse conditionOf (zip [1 :: Int ..] rules)
   conditionOf (n, (condition, _)) = suppressEqual (conditionOfRule n condition)
 
+-- | Reads the signal once: the value that it has now, or its first one.
+--
+-- > read (pure a)       =  pure a
+-- > read (watching t)   =  atomically t
+-- > read (polling p a)  =  a     -- in a thread of its own
+-- > read signal         =  waitUntilJust (Just \<$> signal)
+--
+-- [Result] The value. A signal that has none yet is waited for.
+-- [Failure, fault] Of the signal: thrown.
+-- [Cancellation] Requests the stop of the sensors; returns after they have ended.
+--
+-- >>> Signal.read ((+ 1) <$> Signal.polling 60 (pure 2))
+-- 3
+--
+-- @since 0.1.0.0
+read :: Signal a -> Behavior a
+read = awaiting "read" . fmap Just
+
 -- | Waits until the condition holds; returns at once if it does.
 --
 -- If the condition fails, faults or no longer has a value, it throws the same.
@@ -181,6 +203,27 @@ waitUntil :: Signal Bool -> Behavior ()
 waitUntil condition = reactToCondition "waitUntil" condition $ \case
   True -> Conclude Nothing (pure ())
   False -> Idle
+
+-- | Waits until there is a value, and returns it: the first one. Otherwise it is as 'waitUntil'.
+--
+-- > waitUntil c  =  waitUntilJust ((\holds -> if holds then Just () else Nothing) \<$> c)
+--
+-- >>> Signal.waitUntilJust (lookup "kitchen" <$> pure [("hall", 1), ("kitchen", 2)])
+-- 2
+--
+-- @since 0.1.0.0
+waitUntilJust :: Signal (Maybe a) -> Behavior a
+waitUntilJust = awaiting "waitUntilJust"
+
+awaiting :: String -> Signal (Maybe a) -> Behavior a
+awaiting name signal = react name [] (Awaited <$> signal) $ \(Awaited value) ->
+  maybe Idle (Conclude Nothing . pure) value
+
+-- | A value that is waited for: the first one ends the wait, so no two are compared.
+newtype Awaited a = Awaited (Maybe a)
+
+instance Eq (Awaited a) where
+  Awaited a == Awaited b = isNothing a && isNothing b
 
 -- | A guard: runs the behaviour while the condition holds, and fails if the condition does not
 -- hold, at the start or later.

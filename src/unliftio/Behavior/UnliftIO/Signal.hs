@@ -43,12 +43,15 @@ module Behavior.UnliftIO.Signal
   , switch
   , teleoReactive
 
-    -- ** Waiting for a condition, and requiring one
+    -- ** Reading, waiting for a condition, and requiring one
+  , read
   , waitUntil
+  , waitUntilJust
   , whileHolding
   ) where
 
 import Control.Monad.IO.Unlift (MonadIO (..), MonadUnliftIO, withRunInIO)
+import Prelude hiding (read)
 
 import Behavior (Seconds)
 import Behavior.Signal
@@ -138,6 +141,14 @@ switch signal act = withRunInIO $ \run -> IO.switch signal (run . act)
 teleoReactive :: MonadUnliftIO m => [(Signal Bool, m a)] -> m a
 teleoReactive rules = withRunInIO $ \run -> IO.teleoReactive (map (fmap run) rules)
 
+-- | 'Behavior.Signal.read'.
+--
+-- > run (read s)  =  Behavior.Signal.read s
+--
+-- @since 0.1.0.0
+read :: MonadIO m => Signal a -> m a
+read = liftIO . IO.read
+
 -- | 'Behavior.Signal.waitUntil'.
 --
 -- > run (waitUntil c)  =  Behavior.Signal.waitUntil c
@@ -145,6 +156,14 @@ teleoReactive rules = withRunInIO $ \run -> IO.teleoReactive (map (fmap run) rul
 -- @since 0.1.0.0
 waitUntil :: MonadIO m => Signal Bool -> m ()
 waitUntil = liftIO . IO.waitUntil
+
+-- | 'Behavior.Signal.waitUntilJust'.
+--
+-- > run (waitUntilJust s)  =  Behavior.Signal.waitUntilJust s
+--
+-- @since 0.1.0.0
+waitUntilJust :: MonadIO m => Signal (Maybe a) -> m a
+waitUntilJust = liftIO . IO.waitUntilJust
 
 -- | 'Behavior.Signal.whileHolding'.
 --
