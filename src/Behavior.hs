@@ -139,6 +139,10 @@ module Behavior
   , rSelect
   , monitor
 
+    -- * Going on where it was interrupted
+  , resumable
+  , resumableFor
+
     -- * Failing
   , failed
   , failWith
@@ -161,4 +165,5 @@ import Behavior.Internal.Failure
 import Behavior.Internal.Parallel
 import Behavior.Internal.Program
 import Behavior.Internal.Reactive.Polled
+import Behavior.Internal.Resumable
 import Behavior.Internal.Runtime

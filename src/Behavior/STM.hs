@@ -1,8 +1,8 @@
 {-# LANGUAGE CPP #-}
 
 -- |
--- Transactional variables: all of the package stm, with this library's 'atomically'; 'resumable', which
--- keeps its place in one; and 'withTSem', which holds a semaphore while a behaviour runs.
+-- Transactional variables: all of the package stm, with this library's 'atomically'; and 'withTSem', which
+-- holds a semaphore while a behaviour runs.
 --
 -- Import this module in place of "Control.Concurrent.STM" and "Control.Concurrent.STM.TSem": it exports
 -- everything of those except @registerDelay@, whose time cannot be simulated ('Behavior.Time.sleep' and
@@ -16,8 +16,6 @@
 -- blocks.
 module Behavior.STM
   ( atomically
-  , resumable
-  , resumableFor
   , withTSem
 #ifndef __HADDOCK_VERSION__
     -- Haddock would list the whole package here.
@@ -29,7 +27,6 @@ module Behavior.STM
 import Control.Concurrent.STM hiding (atomically, registerDelay)
 import Control.Concurrent.STM.TSem
 
-import Behavior.Internal.Resumable
 import Behavior.Internal.Runtime (atomically)
 import Behavior.Internal.Semaphore
 

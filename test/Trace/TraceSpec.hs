@@ -21,7 +21,7 @@ import Behavior.Internal.Runtime (liveThreadCount)
 import Behavior.Internal.Trace.Place (Place (trace), Receiver (..), Trace (traceClock), inPlace, myPlace, withReceiver)
 import Behavior.Internal.Trace.Span (abandonableIn)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
-import Behavior.STM (atomically, resumable)
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (SimOptions (scheduled), Run (events), Schedule (..), defaultSimOptions, simulateWith)
 import Behavior.Time (abandoning, cleanupWithin, timeout)

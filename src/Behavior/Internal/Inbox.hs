@@ -138,7 +138,7 @@ namedInboxWith name render inbox = inbox {called = Just (name, render)}
 -- count towards the inbox's capacity.
 --
 -- As with 'Behavior.Signal.monitor' the task is stopped first, and restarts from its beginning
--- (what must go on where it was, uses 'Behavior.STM.resumable'). Only the caller can interrupt the
+-- (what must go on where it was, uses 'Behavior.resumable'). Only the caller can interrupt the
 -- handler: a message waits for the one before it. The handler's result, failure, fault and
 -- cancellation are those of the recovery in 'Behavior.Signal.monitor'. The transaction is committed
 -- with exceptions masked; while it retries it can be interrupted.

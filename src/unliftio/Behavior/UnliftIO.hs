@@ -49,6 +49,10 @@ module Behavior.UnliftIO
   , rSelect
   , monitor
 
+    -- * Going on where it was interrupted
+  , resumable
+  , resumableFor
+
     -- * Failing
   , failed
   , failWith
@@ -69,6 +73,7 @@ module Behavior.UnliftIO
 
 import Control.Exception (Exception, SomeException)
 import Control.Monad.IO.Unlift (MonadIO (..), MonadUnliftIO, withRunInIO)
+import Data.Map.Lazy (Map)
 
 import Behavior
   ( Behavior
@@ -83,6 +88,7 @@ import Behavior
   , failurePath
   )
 import qualified Behavior as IO
+import Behavior.STM (STM, TVar)
 
 -- | 'Behavior.runBehavior'.
 --
@@ -183,6 +189,22 @@ rSelect test left right = withRunInIO $ \run -> IO.rSelect (run test) (run left)
 -- @since 0.1.0.0
 monitor :: MonadUnliftIO m => m Bool -> m () -> m a -> m a
 monitor test recovery task = withRunInIO $ \run -> IO.monitor (run test) (run recovery) (run task)
+
+-- | 'Behavior.resumable'.
+--
+-- > run (resumable left f)  =  Behavior.resumable left (run . f)
+--
+-- @since 0.1.0.0
+resumable :: MonadUnliftIO m => TVar [a] -> (a -> m ()) -> m ()
+resumable left act = withRunInIO $ \run -> IO.resumable left (run . act)
+
+-- | 'Behavior.resumableFor'.
+--
+-- > run (resumableFor progress key steps f)  =  Behavior.resumableFor progress key steps (run . f)
+--
+-- @since 0.1.0.0
+resumableFor :: (Ord k, MonadUnliftIO m) => TVar (Map k [a]) -> k -> [a] -> (a -> m ()) -> m (STM ())
+resumableFor progress key steps act = withRunInIO $ \run -> IO.resumableFor progress key steps (run . act)
 
 -- | 'Behavior.failingOn'.
 --

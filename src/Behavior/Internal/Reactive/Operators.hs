@@ -74,7 +74,8 @@ rSelect condition left right = reactToCondition "rSelect" condition $ \case
 -- The condition is read before anything starts. When it is true, that is latched:
 -- the task is stopped, and when it has ended, cleanup included, @recovery@ runs to
 -- completion while the condition is not watched, even if it has become false by
--- then. After that it is read again; the task restarts from its beginning.
+-- then. After that it is read again; the task restarts from its beginning. (To go on where it was, use
+-- 'Behavior.resumable' in the task.)
 --
 -- [Result] That of the task, also if it completed although its stop was requested; then the
 --   recovery does not run.

@@ -120,7 +120,7 @@ pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
 -- > stoppedWhile c act  =  teleoReactive [(not \<$> c, act)]
 --
 -- For what its driver can pause, there is 'pausedWhile'. To go on where it was, the behaviour keeps its
--- progress: 'Behavior.STM.resumable'.
+-- progress: 'Behavior.resumable'.
 --
 -- > Signal.stoppedWhile personNear (resumable waypoints driveTo)
 --

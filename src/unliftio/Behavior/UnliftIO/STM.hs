@@ -9,8 +9,6 @@
 -- does; what is not a behaviour is that module's own.
 module Behavior.UnliftIO.STM
   ( atomically
-  , resumable
-  , resumableFor
   , withTSem
 
     -- * Variables, outside of a transaction
@@ -47,7 +45,6 @@ import Control.Concurrent.STM hiding
   )
 import Control.Concurrent.STM.TSem
 import Control.Monad.IO.Unlift (MonadIO (..), MonadUnliftIO, withRunInIO)
-import Data.Map.Lazy (Map)
 import Numeric.Natural (Natural)
 import System.Mem.Weak (Weak)
 
@@ -60,22 +57,6 @@ import qualified Behavior.STM as IO
 -- @since 0.1.0.0
 atomically :: MonadIO m => STM a -> m a
 atomically = liftIO . IO.atomically
-
--- | 'Behavior.STM.resumable'.
---
--- > run (resumable left f)  =  Behavior.STM.resumable left (run . f)
---
--- @since 0.1.0.0
-resumable :: MonadUnliftIO m => TVar [a] -> (a -> m ()) -> m ()
-resumable left act = withRunInIO $ \run -> IO.resumable left (run . act)
-
--- | 'Behavior.STM.resumableFor'.
---
--- > run (resumableFor progress key steps f)  =  Behavior.STM.resumableFor progress key steps (run . f)
---
--- @since 0.1.0.0
-resumableFor :: (Ord k, MonadUnliftIO m) => TVar (Map k [a]) -> k -> [a] -> (a -> m ()) -> m (STM ())
-resumableFor progress key steps act = withRunInIO $ \run -> IO.resumableFor progress key steps (run . act)
 
 -- | 'Behavior.STM.withTSem'.
 --
