@@ -15,7 +15,7 @@ module Behavior.Internal.Leftmost
   , tryReadLeftmost
   ) where
 
-import Control.Concurrent.STM
+import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception (SomeException)
 
 import Behavior.Internal.Scope (Outcome, result)

@@ -1,11 +1,11 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The seam: everything that the library does with threads, time and blocking goes through
--- this module. No other module (except what it uses, "Behavior.Internal.Runtime.Fork" and
--- "Behavior.Internal.Runtime.TimerWheel", the simulator, and the threads of a trace's sinks) forks, delays, throws
--- to a thread or blocks in a transaction. So a simulation that replaces the operations of this module replaces all
--- of them.
+-- The seam: everything that an operator does with threads, time and blocking goes through
+-- this module. No module but those below it and the simulator forks, delays, throws to a thread or blocks in a
+-- transaction. So a simulation that replaces the operations of this module replaces all of them. (Two have threads
+-- that are part of no simulation: "Behavior.Internal.Trace.Sink", and "Behavior.Internal.ProcessSignals" for the
+-- handlers of the process. @.ci\/lint@ checks that there is no other.)
 --
 -- Each operation is dispatched to one of two backends: the real one, or the simulation that
 -- the calling thread is part of ("Behavior.Internal.Runtime.Dispatch").
