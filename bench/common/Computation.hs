@@ -23,7 +23,7 @@ queens n = go n
 counting :: IO ()
 counting = for_ [1 ..] $ evaluate . steps 10000
 
--- | Steps of a random number generator.
+-- | Steps of a random number generator, Knuth's for MMIX.
 steps :: Int -> Int -> Int
 steps n seed
   | n == 0 = seed

@@ -52,7 +52,8 @@ underRandom from n (Promise text gen keeping) =
     let program = programFrom (gen Full) (seedOf text i)
      in tried (show program) (Random perProgram (seedOf text i)) (`keeping` program)
 
--- | The seed of the i-th program for the promise with this text: each promise is tried with other programs.
+-- | The seed of the i-th program for the promise with this text: each promise is tried with other programs. (A
+-- hash of the text, by the usual factor; 1000003 is a prime.)
 seedOf :: String -> Int -> Int
 seedOf text i = i + 1000003 * foldl' (\n c -> (31 * n + fromEnum c) `mod` 1000003) 0 text
 

@@ -111,7 +111,8 @@ inReality seed runs p = do
   state <- newIORef seed
   realOutcomes runs (observed (jitter state) p)
 
--- | Half of the time does nothing; otherwise yields, or takes a few microseconds.
+-- | Half of the time does nothing; otherwise yields, or takes a few microseconds. (Random numbers as the C standard
+-- makes them.)
 jitter :: IORef Int -> IO ()
 jitter state = do
   n <- atomicModifyIORef' state (\s -> let s' = (s * 1103515245 + 12345) `mod` 2147483648 in (s', s' `div` 65536))

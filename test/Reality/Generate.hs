@@ -13,7 +13,7 @@ import Test.QuickCheck.Random (mkQCGen)
 
 import Reality.Program
 
--- | The programs of a seed.
+-- | The programs of a seed. (Two seeds have no program's seed in common, up to a million programs.)
 programs :: Int -> [Program]
 programs seed = [lettered (unGen (operator 1) (mkQCGen (seed * 1000003 + n)) 10) | n <- [0 ..]]
 

@@ -100,6 +100,7 @@ recordedRun around salt how w = do
             run here (Owner (Just n) Nothing)
       chance p = do
         n <- readIORef lastPart
+        -- (7919 is a prime, and larger than any program: so each salt has other names.)
         pure (scrambled (salt * 7919 + n) `mod` 8 < (case p of Do _ _ -> 6; _ -> 3))
       receiver detail =
         Receiver
@@ -152,7 +153,7 @@ howOf = \case
 isStop :: PartEnd -> Bool
 isStop = (`elem` [PartStopped, PartFaulted "EnoughOfThis"])
 
--- | A number that looks random.
+-- | A number that looks random, and is the same for the same number: twice the first step of a usual hash.
 scrambled :: Int -> Int
 scrambled n = abs (step (step n))
  where

@@ -21,6 +21,7 @@ attack = forM_ [1 .. 1500 :: Int] $ \k -> forM_ places $ \(place, program) -> do
   inside <- newIORef (0 :: Int)
   let act = bracket_ (add inside 1) (add inside (-1)) (Time.sleep 3600)
       what = "allocation limit in " ++ place ++ ", " ++ show k
+  -- (The factor spreads the limits; they are the same in every run.)
   end <- inThread 5000 what (program (fromIntegral (k * 13 `mod` 20000)) act `finally` disableAllocationLimit)
   n <- readIORef inside
   promise (what ++ ": " ++ show n ++ " behaviours still run") (n == 0)

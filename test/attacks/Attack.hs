@@ -63,7 +63,7 @@ inThread limit what = endsWithin limit what (const (pure ()))
 milliseconds :: Int -> IO ()
 milliseconds n = threadDelay (n * 1000)
 
--- | Random numbers from this seed: each is from zero to below the given one.
+-- | Random numbers from this seed: each is from zero to below the given one. (As the C standard makes them.)
 randomBelow :: Int -> IO (Int -> IO Int)
 randomBelow seed = do
   state <- newIORef seed

@@ -20,7 +20,8 @@ attack =
       spun <- newIORef (0 :: Int)
       started <- newEmptyMVar
       let spin n = replicateM_ n (modifyIORef' spun (+ 1))
-          -- It throws before its stop is requested, at the same moment, or in its cleanup.
+          -- It throws before its stop is requested, at the same moment, or in its cleanup. (The factors spread the
+          -- moments; they are the same in every run.)
           throwing =
             (tryPutMVar started () >> yield >> spin (k * 7 `mod` 900) >> throwTo me (Boom k) >> milliseconds 3600000)
               `onException` writeIORef stopped True

@@ -26,7 +26,7 @@ attack = do
     n <- liveThreadCount
     promise (show n ++ " threads were left") (n == 0)
 
--- | A random number below the given one.
+-- | A random number below the given one. (The generator is Knuth's for MMIX.)
 type Below = Int -> IO Int
 
 below :: IORef Int -> Below

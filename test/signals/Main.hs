@@ -133,7 +133,7 @@ shown status = case status of
   Terminated signal _ -> 128 + fromIntegral signal
   Stopped signal -> 128 + fromIntegral signal
 
--- | Random times of up to three milliseconds (xorshift).
+-- | Random times of up to three milliseconds (xorshift; the seed is multiplied by 2^32 over the golden ratio).
 delays :: Int -> [Word64]
 delays seed = map (`mod` 3000000) (drop 10 (unfoldr (Just . next) (fromIntegral seed * 2654435769 + 1)))
  where

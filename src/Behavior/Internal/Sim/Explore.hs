@@ -188,6 +188,7 @@ tryExplore plan property = case planSearch plan of
     go i !before
       | i > n = pure (Right (reported True before))
       | otherwise = do
+          -- (So two seeds have different schedules, unless a plan has more than a million.)
           t <- try' (policy (Seeded (seed * 1000003 + i)))
           case thrown t of
             Nothing -> go (i + 1) (counting before t)

@@ -82,7 +82,8 @@ preempting strictly exceptions = do
     | otherwise = Right (usual d)
 
 -- | A random schedule. Each has its own rate of pre-emptions, between one in four points and
--- one in five hundred: few pre-emptions find most defects.
+-- one in five hundred: few pre-emptions find most defects. (The numbers are those of SplitMix; what is added to
+-- the seed could be anything, and fixes which schedule a seed has.)
 random :: Int -> IO Policy
 random seed = do
   state <- newIORef (fromIntegral seed * 0x9e3779b97f4a7c15 + 0x1234567)
