@@ -146,12 +146,15 @@ names = do
     let door = recordOf [("open", AnActionOn), ("open front", AnAction)] [call "open \"front\""]
     wrong (verdict (never (startOf "open front")) door) `shouldBe` []
 
-  it "are at least one" $ do
-    evaluate (countOf (anyOf []) world) `shouldThrow` \(ErrorCall why) -> "anyOf: at least one moment" `isInfixOf` why
-    mock <- newMock
-    begin mock
-    for_ [mempty, mconcat [mempty, mempty]] $ \claim ->
-      (mock `shouldRecord` claim) `shouldThrow` \(ErrorCall why) -> "claims nothing" `isInfixOf` why
+  it "are no notes; but a note in another spelling is an error" $ do
+    let came = recordOf [("orders", ADriver)] [line 1 text Noted | text <- ["orders: \"tea\"", "ready"]]
+    for_ [never (noted "orders: tea"), whenever (noted "orders: tea") mempty] $ \claim ->
+      drop 1 (wrong (verdict claim came)) `shouldBe` ["\"orders: tea\" was not noted, but \"orders: \\\"tea\\\"\"."]
+    for_ ["orders: milk", "tea", "not ready"] $ \text -> wrong (verdict (never (noted text)) came) `shouldBe` []
+    wrong (verdict (eventually (noted "orders: \"tea\"")) came) `shouldBe` []
+
+  it "are at least one" $
+    evaluate (countOf (anyOf []) world) `shouldThrow` (== ErrorCall "anyOf: at least one moment")
 
   it "are said to be what the functions of the world have made" $ do
     mock <- newMock
@@ -188,6 +191,7 @@ names = do
     [ ("open \"cellar\"", ["open \"front\""])
     , ("open cellar", ["open \"front\""])
     , ("open \"door\"", ["open \"front door\""])
+    , ("open \"front, door\"", ["open \"front door\""])
     , ("open North", ["open Going North"])
     , ("open 3", ["open 13"])
     , ("open '+'", ["open '-'"])

@@ -17,7 +17,6 @@ module Behavior.Internal.Mock.Claim
     -- * Checking
   , holds
   , verdict
-  , claimsNothing
   , premisesIn
   ) where
 
@@ -267,10 +266,6 @@ verdict claim record = case unfitIn record (claimNeeds claim) of
   entries = recordEntries record
   refuted which why rows = Left (unlines (("This does not hold: " ++ which ++ ".") : why : rows))
   capital why = map toUpper (take 1 why) ++ drop 1 why
-
--- | Whether it is 'mempty'.
-claimsNothing :: Claim -> Bool
-claimsNothing = null . claimWords
 
 -- | What has to come, or the claim holds whatever happens: in words, and whether it has come in this record.
 premisesIn :: Record -> Claim -> [(String, Bool)]

@@ -148,11 +148,11 @@ needOf :: String -> String -> String -> Need
 needOf name verb shown = Need name (verb ++ shown) [ASensor, ACondition] (Just shown)
 
 -- | This text was recorded by 'Behavior.Sim.Mock.note', or by a 'Behavior.Sim.Mock.driver'. It may be any
--- text: one that nothing notes never comes.
+-- text: one that nothing notes never comes. (If the record has it with other quotes, that is an error.)
 --
 -- @since 0.1.0.0
 noted :: String -> Moment
-noted text = (momentOf [] "is noted" (== Noted) text) {momentNeeds = []}
+noted text = (momentOf [] "is noted" (== Noted) text) {momentNeeds = [Noting text]}
 
 momentOf :: [SubjectKind] -> String -> (EntryKind -> Bool) -> String -> Moment
 momentOf kinds verb isIt name =
@@ -280,6 +280,7 @@ unfitIn record = unfit (recordSubjects record) (mapMaybe shown (recordEntries re
   shown e = case entryKind e of
     Is value -> Just (entrySubject e, value)
     Becomes value -> Just (entrySubject e, value)
+    Noted -> Just ("", entrySubject e)
     _ | null (entryArgument e) -> Nothing
     _ -> Just (entrySubject e, entryArgument e)
 

@@ -43,15 +43,13 @@ kindName kind = case kind of
   ACondition -> "condition"
   ADriver -> "driver"
 
--- | What a claim needs: something of this name and of one of these kinds, since only that does what
--- the verb says.
-data Need = Need
-  { needName :: String
-  , needVerb :: String
-  , needKinds :: [SubjectKind]
-  , needValue :: Maybe String
-  -- ^ The value that the verb names, as it is shown.
-  }
+-- | What a claim needs.
+data Need
+  = -- | Something of this name, which does what the verb says: so it is of one of these kinds; and the value that
+    -- the verb names, as it is shown.
+    Need String String [SubjectKind] (Maybe String)
+  | -- | A note, of any text.
+    Noting String
 
 -- | The kinds of actions.
 anyAction :: [SubjectKind]
@@ -71,8 +69,8 @@ anyAction = [AnAction, AnActionOn]
 -- >>> whyNot "drvie"
 -- Nothing in this world is called "drvie", only "low", "drive", "open".
 --
--- It is not known which arguments and values there are. But one that was, as it is shown with the name of its
--- action or condition, and is written in another way, is an error too:
+-- It is not known which arguments, values and notes there are. But one that was, as it is shown with the name of its
+-- action, condition or sensor (of a note: @""@), and is written in another way, is an error too:
 --
 -- >>> whyNot "open front"
 -- "open" was not called as "open front", but as "open \"front\"".
@@ -80,6 +78,8 @@ anyAction = [AnAction, AnActionOn]
 unfit :: [(String, SubjectKind)] -> [(String, String)] -> [Need] -> Maybe String
 unfit world shown = listToMaybe . mapMaybe unfitNeed
  where
+  unfitNeed (Noting text) =
+    listToMaybe [show text ++ " was not noted, but " ++ show known ++ "." | known <- otherSpellings sameWords text ""]
   unfitNeed (Need name verb kinds value)
     | any ((`elem` kinds) . snd) namesakes = listToMaybe (maybe (unlikeCalls name) (unlikeValues name) value)
     | (_, kind) : _ <- namesakes = Just (name `is` kind ++ ", and " ++ negated verb ++ ". " ++ those kinds)
@@ -94,11 +94,14 @@ unfit world shown = listToMaybe . mapMaybe unfitNeed
     | name `notElem` map fst world
     , (known, AnActionOn) <- world
     , Just given <- [stripPrefix (known ++ " ") name]
-    , argument <- given `rewriting` known
+    , argument <- otherSpellings rewrites given known
     ]
   unlikeValues name given =
-    [show name ++ " was not recorded as " ++ given ++ ", but as " ++ value ++ "." | value <- given `rewriting` name]
-  given `rewriting` name = if given `elem` these then [] else filter (given `rewrites`) these
+    [ show name ++ " was not recorded as " ++ given ++ ", but as " ++ value ++ "."
+    | value <- otherSpellings rewrites given name
+    ]
+  -- What was shown with this name, and is what is given in another spelling; unless that was shown too.
+  otherSpellings isLike given name = if given `elem` these then [] else filter (given `isLike`) these
    where
     these = [text | (known, text) <- shown, known == name]
 
@@ -117,17 +120,25 @@ isCalled :: (String, SubjectKind) -> String -> Bool
 isCalled (known, kind) name =
   known == name || (kind == AnActionOn && any (any (/= ' ')) (stripPrefix (known ++ " ") name))
 
--- | Whether the first is the second, as it is shown, with other quotes, brackets or blanks, or as a number of another
--- type; or without 'Just'; or without the quotes, also without the constructor before them.
+-- | Whether the first is the second, as it is shown, with other quotes, brackets or blanks.
+sameWords :: String -> String -> Bool
+given `sameWords` shown = bare given == bare shown && not (null (bare given))
+
+-- | The words of a text without quotes and brackets.
+bare :: String -> [String]
+bare = words . map (\c -> if c `elem` "\"'()[]{},=" then ' ' else c)
+
+-- | Also as a number of another type; or without 'Just'; or without the quotes and the constructor before them.
+-- (But of two texts in quotes each is itself.)
 rewrites :: String -> String -> Bool
-given `rewrites` shown = not (null (bare given)) && (bare given == bare shown || isSameNumber || lacksBeginning)
+given `rewrites` shown =
+  not (all ((== "\"") . take 1) [given, shown]) && (given `sameWords` shown || isSameNumber || lacksBeginning)
  where
   lacksBeginning =
-    bare given `isSuffixOf` bare shown
+    not (null (bare given))
+      && bare given `isSuffixOf` bare shown
       && (take 1 (bare shown) == ["Just"] || (not (quoted given) && quoted shown))
   -- (The first digit is looked at first, since 'reads' takes long.)
   isSameNumber =
     take 1 given == take 1 shown && or [a == b | (a, "") <- reads given, (b, "") <- reads shown :: [(Double, String)]]
-  bare = words . map (\c -> if c `elem` marks then ' ' else c)
   quoted = any (`elem` "\"'")
-  marks = "\"'()[]{},="

@@ -36,7 +36,7 @@ import Data.IORef
 import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Mock.Claim (Claim, claimsNothing, premisesIn, verdict)
+import Behavior.Internal.Mock.Claim (Claim, premisesIn, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime
@@ -227,7 +227,7 @@ happened mock = do
 -- | Throws a 'BrokenClaim' with the reason, unless the claim holds for the record. Use it
 -- like an expectation of hspec.
 --
--- [Fault] Throws an 'ErrorCall' if there is no record ('happened'), or no claim ('mempty').
+-- [Fault] Throws an 'ErrorCall' if there is no record ('happened').
 --
 -- In an exploration a claim that does not hold fails the property, also if it was checked inside of the run, and
 -- whatever catches the exception there. And it is kept whether that has come without which the claim holds
@@ -244,8 +244,6 @@ shouldRecord :: Mock -> Claim -> IO ()
 shouldRecord mock claim = do
   record <- happened mock
   property <- ownProperty mock
-  when (claimsNothing claim) . throwIO . ErrorCall $
-    "this claims nothing (mempty, or mconcat of no claims), so it would hold whatever happened"
   for_ (either Just (const Nothing) (verdict claim record)) $ \why -> do
     -- Inside of a run this exception is only how a behaviour ends.
     run <- simulatedRun
