@@ -53,6 +53,13 @@ goingWrong = do
         `shouldReturn` endingOf (Left e)
       notes entries `shouldReturn` []
 
+  it "gives an undefined value is not taken for an exception from outside: the fault of another counts" $ do
+    entered <- newGate
+    level <- newSensor $ \n -> when (n == 2) ((open entered >> hang) `onException` throwIO (Fault "reading"))
+    let undefinedValue = Signal.polling 3600 (pass entered >> pure (throw (Fault "value")))
+    ending (Signal.rSelect (const <$> undefinedValue <*> sensing level) hang hang)
+      `shouldReturn` (FaultedWith (show (Fault "reading")) :: Ending ())
+
   it "catches its stop request and returns does not prevent the operator from ending" $ do
     entered <- newGate
     level <- newSensor $ \_ -> do

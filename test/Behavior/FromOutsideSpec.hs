@@ -171,7 +171,7 @@ undefinedExceptions = do
     let slow = (open entered >> hang) `uninterruptibly` (open stopping >> pass mayEnd >> note entries "cleaned up")
     end <- withThread (parallel slow hang) $ \caller -> do
       pass entered
-      throwing (asyncThreadId caller) (throw (Fault "undefined") :: Cancel)
+      throwing (asyncThreadId caller) (throw (Fault "undefined") :: SomeException)
       pass stopping
       stillRunning caller
       open mayEnd
@@ -202,6 +202,11 @@ undefinedExceptions = do
         awaitEnd caller
       end `shouldBe` (FaultedWith (show (Fault "undefined")) :: Ending ())
       notes entries `shouldReturn` ["recovered"]
+  it "as the fault of a cleanup that the user's code throws together with the stop: ends as a fault" $ do
+    entered <- newGate
+    let cleanup e = throwIO (StoppedWithFault e (toException (throw (Fault "undefined") :: Fault)))
+    ending (pass entered `parallel` ((open entered >> hang) `catch` cleanup :: IO ()))
+      `shouldReturn` FaultedWith (show (Fault "undefined"))
   it "made of other undefined exceptions: ends as a fault too" $
     for_ (take 3 (iterate throw (throw (Fault "undefined") :: SomeException))) $ \bottom ->
       beside (throwIO bottom) parallel

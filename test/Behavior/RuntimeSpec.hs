@@ -24,6 +24,7 @@ import Behavior.Internal.Cause (Cause (..))
 import Behavior.Internal.Runtime
 import Behavior.Internal.Runtime.Property (mistakeOf, testing)
 import Behavior.Internal.Scope hiding (Outcome (..))
+import Behavior.Internal.Stop (Stop (..), causeOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly)
 import Support
@@ -227,9 +228,10 @@ mistakes = do
       mistakeOf property
     fmap show kept `shouldBe` Just (show (Fault "first"))
 
-  it "has no property after its end" $ do
-    testing (\_ -> pure ())
-    isNothing <$> currentProperty `shouldReturn` True
+  it "is no property after its end any more" $ do
+    for_ [pure (), throwIO (Fault "property")] $ \act -> do
+      _ <- ending (testing (\_ -> act))
+      isNothing <$> currentProperty `shouldReturn` True
 
 scopes :: Spec
 scopes = do
@@ -414,3 +416,13 @@ pairs = do
     let pair = StoppedWithFault (toException (Cancel "user")) (toException (Fault "bug"))
     show (Just pair) `shouldBe` "Just (StoppedWithFault (Cancel \"user\") (Fault \"bug\"))"
     displayException pair `shouldBe` "stopped by Cancel \"user\", and while stopping: Fault \"bug\""
+
+  it "stays a pair where a branch throws it that was not stopped" $ do
+    let pair = StoppedWithFault (toException (Cancel "user")) (toException (Fault "bug"))
+    ending (parallel (throwIO pair :: IO ()) (hang :: IO ()))
+      `shouldReturn` CancelledWithFault (show (Cancel "user")) (show (Fault "bug"))
+
+  it "has the cause of its cancellation" $ do
+    self <- myThreadId
+    let stop = toException (Stop self (SiblingFinished "left"))
+    causeOf (toException (StoppedWithFault stop (toException (Fault "bug")))) `shouldBe` SiblingFinished "left"

@@ -15,7 +15,7 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..))
+import Behavior.Internal.Runtime (Label (..), sleepToSlot)
 import Behavior.Internal.Seconds (duration, period)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
@@ -90,13 +90,18 @@ sleeping = do
   it "returns at once for zero seconds, even under uninterruptibleMask" $
     uninterruptibleMask_ (sleep 0)
 
-  it "for zero seconds does not let another thread run in between, in a simulation" $
-    void . explore (randomly 100) $ \simulated -> do
-      written <- newIORef ""
-      found <- newIORef ""
-      let left = writeIORef written "left" >> sleep 0 >> readIORef written >>= writeIORef found
-      _ <- simulated (both left (writeIORef written "right"))
-      readIORef found `shouldReturn` "left"
+  for_
+    [ ("for zero seconds", \_ -> sleep 0)
+    , ("until a slot that begins now", \t -> void (sleepToSlot 1 t t))
+    ]
+    $ \(how, act) ->
+      it (how ++ " does not let another thread run in between, in a simulation") $
+        void . explore (randomly 100) $ \simulated -> do
+          written <- newIORef ""
+          found <- newIORef ""
+          let left = now >>= \t -> writeIORef written "left" >> act t >> readIORef written >>= writeIORef found
+          _ <- simulated (both left (writeIORef written "right"))
+          readIORef found `shouldReturn` "left"
 
   it "takes at least the given time" $
     for_ [0.0001, 0.001, 0.003] $ \s -> do

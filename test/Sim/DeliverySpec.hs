@@ -248,6 +248,11 @@ throwers = do
 
 endOfBranch :: Spec
 endOfBranch = do
+  it "is recorded with its start and its end, also if it is stopped before it begins" $
+    void . explore (exhaustively 1) $ \simulate' -> do
+      run <- simulate' (parallel (pure ()) (pure ()))
+      [stepKind s | s <- steps run, stepLabel s == Label "parallel" "right", stepKind s `elem` [Starts, Ends]]
+        `shouldBe` [Starts, Ends]
   it "can be stopped after its last operation" $ do
     ends <- everyEnd $ do
       target <- mask_ (start (Label "target" "") (sleep 1))
