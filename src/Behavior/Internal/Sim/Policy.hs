@@ -9,7 +9,6 @@ module Behavior.Internal.Sim.Policy
   , Decision (..)
   , policy
   , preempting
-  , random
   , fully
   ) where
 

@@ -7,7 +7,6 @@ module Behavior.Trace.Terminal.Screen
     Line
   , Paint (..)
   , plain
-  , painted
   , inAscii
 
     -- * Columns
