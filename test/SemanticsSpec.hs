@@ -428,10 +428,10 @@ relation = do
   script n how = Script n how Unmasked StopsAtOnce
   -- An action that takes longer than anything else, and responds to a stop request like that.
   stoppedBy response name = Do name [(script 50 (Succeeds 0)) {onStop = response}]
-  with changes' p =
+  with later p =
     World
       { conditions = [("p", At 0), ("q", At 0)]
-      , changes = changes'
+      , changes = later
       , cancelAt = 100
       , program = p
       , caller = Operator
@@ -440,6 +440,6 @@ relation = do
   -- Another thread cancels it at 2 and at 3.
   cancelledTwice p = (with [] p) {cancelAt = 2, caller = PlainThread Asynchronous 1}
   endsIn p = endsWith (with [] p)
-  endsWith world ends' = fmap (Set.map end) (paths 10000 whatIsDone world) `shouldBe` Just (Set.fromList ends')
+  endsWith world expected = fmap (Set.map end) (paths 10000 whatIsDone world) `shouldBe` Just (Set.fromList expected)
   hasTimeline world transitions =
     fmap (Set.map timeline) (paths 10000 whatIsDone world) `shouldBe` Just (Set.singleton transitions)

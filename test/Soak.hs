@@ -44,7 +44,7 @@ main = do
 oneRound :: Int -> IO Tried
 oneRound n = do
   putStrLn ("-- round " ++ show n)
-  promised' <- forM promises $ \promise -> do
+  tallies <- forM promises $ \promise -> do
     putStrLn (promised promise)
     (<>)
       <$> timed "random schedules" (underRandom (1 + 5000 * (n - 1)) 100000 promise)
@@ -56,7 +56,7 @@ oneRound n = do
   putStrLn "Traces"
   checks "random programs, each with the trace that it must have" 100000 tracedRight
   checks "random programs, with sinks and without" 10000 sinksChangeNothing
-  pure (mconcat promised')
+  pure (mconcat tallies)
 
 checks :: String -> Int -> Property -> IO ()
 checks name n prop = do

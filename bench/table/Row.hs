@@ -74,12 +74,12 @@ summarise figure rounds = case summary figure of
 -- turns affects both. (If one of them had more rounds than the other, several of its rounds
 -- count as one turn.)
 over :: (Figure, [Double]) -> (Figure, [Double]) -> Double
-over (mine, ours') (theirs, theirs') = case (summary mine, summary theirs) of
-  (Median, Median) -> median (zipWith quotient (inTurns ours') (inTurns theirs'))
-  _ -> quotient ours' theirs'
+over (mine, us) (theirs, them) = case (summary mine, summary theirs) of
+  (Median, Median) -> median (zipWith quotient (inTurns us) (inTurns them))
+  _ -> quotient us them
  where
   quotient a b = let (x, y) = (summarise mine a, summarise theirs b) in if x == y then 1 else x / y
-  turns = min (length ours') (length theirs')
+  turns = min (length us) (length them)
   inTurns rounds = [take (end - begin) (drop begin rounds) | (begin, end) <- zip bounds (drop 1 bounds)]
    where
     bounds = [i * length rounds `div` turns | i <- [0 .. turns]]

@@ -279,11 +279,11 @@ ties = do
 
 starting :: Spec
 starting = do
-  for_ [("parallel", parallel), ("both", both)] $ \(operator, apply') ->
+  for_ [("parallel", parallel), ("both", both)] $ \(operator, operate) ->
     it (operator ++ " runs both at the same time") $ do
       left <- newGate
       right <- newGate
-      apply' (open left >> pass right) (open right >> pass left)
+      operate (open left >> pass right) (open right >> pass left)
 
   it "parallel ends when one has ended, whichever it is, and the other has been stopped" $
     for_ [id, flip] $ \turned -> do
@@ -438,17 +438,17 @@ groups =
 
 together :: Spec
 together = do
-  for_ groups $ \(operator, size, apply') ->
+  for_ groups $ \(operator, size, operate) ->
     it (operator ++ ": all stop requests are made at once, so that cleanups can wait for each other") $ do
       inside <- replicateM size newGate
       received <- replicateM size newGate
       let act n =
             uninterruptibly (open (inside !! n) >> hang) $
               open (received !! n) >> traverse_ pass received
-      cancelling (apply' (map act [0 .. size - 1])) (traverse_ pass inside)
+      cancelling (operate (map act [0 .. size - 1])) (traverse_ pass inside)
         `shouldReturn` CancelledBy (show theCancel)
 
-  for_ groups $ \(operator, size, apply') ->
+  for_ groups $ \(operator, size, operate) ->
     it (operator ++ ": the others receive their stop requests while one is uninterruptible") $
       for_ [0 .. size - 1] $ \uninterruptible -> do
         inside <- replicateM size newGate
@@ -459,10 +459,10 @@ together = do
                   hang
               | otherwise = (open (inside !! n) >> hang) `onException` open (received !! n)
             others n = [gate | (k, gate) <- zip [0 ..] received, k /= n]
-        cancelling (apply' (map act [0 .. size - 1])) (traverse_ pass inside)
+        cancelling (operate (map act [0 .. size - 1])) (traverse_ pass inside)
           `shouldReturn` CancelledBy (show theCancel)
 
-  for_ groups $ \(operator, size, apply') ->
+  for_ groups $ \(operator, size, operate) ->
     it (operator ++ ": all stop requests are made at once when one branch ends the operator") $ do
       inside <- replicateM size newGate
       received <- replicateM size newGate
@@ -470,4 +470,4 @@ together = do
           act n =
             uninterruptibly (open (inside !! n) >> hang) $
               open (received !! n) >> traverse_ pass (drop 1 received)
-      ending (apply' (map act [0 .. size - 1])) `shouldReturn` FailedWith (show Failed)
+      ending (operate (map act [0 .. size - 1])) `shouldReturn` FailedWith (show Failed)

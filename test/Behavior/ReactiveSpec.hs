@@ -181,12 +181,12 @@ selecting = do
   it "receives its cancellation while a branch is uninterruptible, and then stops its sensor" $ do
     -- The stop of the branch is requested at 1.2, and the branch is uninterruptible until 5.
     -- The caller is cancelled at 3: that interrupts its stop request, which it has to repeat.
-    readings' <- newIORef []
-    let test = now >>= \t -> (t < 1) <$ modifyIORef readings' (t :)
+    times <- newIORef []
+    let test = now >>= \t -> (t < 1) <$ modifyIORef times (t :)
         slow = uninterruptibleMask_ (sleep 5) >> sleep 100
     run <- simulate (timeout 3 (Signal.rSelect (Signal.polling 0.4 test) slow (pure ())))
     finished run `shouldBe` 5
-    readIORef readings' >>= (`shouldSatisfy` (<= 3)) . maximum
+    readIORef times >>= (`shouldSatisfy` (<= 3)) . maximum
  where
   expected newState = case newState of
     SensorFailure -> FailedWith "FailedBecause \"the sensor\""

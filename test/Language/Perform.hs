@@ -47,12 +47,12 @@ perform acting name s = do
     Uninterruptible -> uninterruptibleMask_
   clean = inCleanup acting . wait acting
   finish :: Name -> Ending -> IO Value
-  finish name' how = do
+  finish action how = do
     emitted (Ends how)
     case how of
       Succeeds n -> pure (Number n)
-      Fails -> throwIO (Failure name')
-      Faults -> throwIO (Fault name')
+      Fails -> throwIO (Failure action)
+      Faults -> throwIO (Fault action)
 
 newtype Failure = Failure Name
 

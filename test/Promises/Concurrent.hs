@@ -203,7 +203,7 @@ stoppedTogether stage (Group composition handlings cause) = do
 
 -- | Chooses what has ended first; on a tie the leftmost.
 firstEnd :: [Maybe (Either BehaviorFailed a)] -> Maybe (Behavior a)
-firstEnd ends' = listToMaybe [either throwIO pure end | Just end <- ends']
+firstEnd outcomes = listToMaybe [either throwIO pure end | Just end <- outcomes]
 
 -- * Ties
 

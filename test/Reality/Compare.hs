@@ -70,8 +70,8 @@ compareMany rule seed limit many runs found = go many (zip [seed ..] (programs s
       Nothing -> go left others
       Just (tried, outcomes) -> do
         -- (A deadlock in reality is one that no simulated run has.)
-        outcomes' <- within 120 (inReality n runs p)
-        found (Compared p tried outcomes outcomes')
+        inThreads <- within 120 (inReality n runs p)
+        found (Compared p tried outcomes inThreads)
         go (left - 1) others
 
 -- | How many schedules the program has, and all their outcomes. 'Nothing' if there are more
@@ -85,8 +85,8 @@ explored rule limit p
   options = defaultSimOptions {livelockLimit = 2000}
   outcomesBy plan = do
     seen <- newIORef Set.empty
-    report <- try . explore plan $ \simulated' -> do
-      run <- simulated' (rule (observed (pure ()) p))
+    report <- try . explore plan $ \running -> do
+      run <- running (rule (observed (pure ()) p))
       case outcome run of
         Returned end -> modifyIORef' seen (Set.insert end)
         _ -> throwIO Endless

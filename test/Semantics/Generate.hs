@@ -18,8 +18,8 @@ import Semantics.Program
 -- | Worlds with programs up to the given depth.
 worlds :: Int -> Gen World
 worlds deep = do
-  levels' <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure NoValue)]) known
-  World levels' <$> someChanges <*> choose (4, 16) <*> someProgram deep <*> callers <*> pure 0
+  first <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure NoValue)]) known
+  World first <$> someChanges <*> choose (4, 16) <*> someProgram deep <*> callers <*> pure 0
  where
   someChanges = do
     n <- choose (0, 8)
@@ -31,8 +31,8 @@ smallWorlds :: Gen World
 smallWorlds = do
   first <- At <$> choose (0, 1)
   n <- choose (0, 2)
-  changes' <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
-  World [("p", first), ("q", At 0)] changes' <$> choose (2, 4) <*> someProgram 1 <*> callers <*> pure 0
+  later <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
+  World [("p", first), ("q", At 0)] later <$> choose (2, 4) <*> someProgram 1 <*> callers <*> pure 0
  where
   someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure NoValue)]
 
@@ -58,5 +58,5 @@ shrinkWorld world =
     ++ [world {cancelAt = n} | n <- shrink (cancelAt world), n > 0]
  where
   shrinkChange (Change at condition level) =
-    [Change at condition (At 0) | level `notElem` [At 0, At 1]] ++ [Change at' condition level | at' <- earlier at]
+    [Change at condition (At 0) | level `notElem` [At 0, At 1]] ++ [Change time condition level | time <- earlier at]
   earlier at = [at - 1 | at > 0, all (\(Change other _ _) -> other <= at - 1 || other >= at) (changes world)]

@@ -125,9 +125,9 @@ observing instrument simulated world = do
     Sim.OutOfTime _ -> seen (Unknown (ticks (finished ran)))
     Sim.Deadlock _ -> seen (Unknown (ticks (finished ran)))
     Sim.Livelock labels _ -> Left ("livelock: " ++ show labels)
-    Sim.BlockedOutside label' _ -> Left ("blocked outside: " ++ show label')
+    Sim.BlockedOutside thread _ -> Left ("blocked outside: " ++ show thread)
     Sim.ExternalWakeup waiting -> Left ("external wakeup: " ++ show waiting)
-    Sim.TooSlow label' _ -> Left ("too slow: " ++ show label')
+    Sim.TooSlow thread _ -> Left ("too slow: " ++ show thread)
     Sim.ScheduleMismatch why -> Left ("schedule mismatch: " ++ why)
  where
   -- Evaluated, so that it does not keep the whole run in memory.
@@ -155,7 +155,7 @@ data Context = Context
 behavior :: Instrument position -> (Transition -> IO ()) -> World -> Behavior Value
 behavior instrument emit world = do
   context <- Context <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty
-  let running at' = runPart (language instrument emit context) noEnvironment at' (program world)
+  let running within = runPart (language instrument emit context) noEnvironment within (program world)
   case caller world of
     Operator -> aroundPart instrument (root instrument) (FirstOf [program world]) $ \_ within ->
       firstOf [running (branchOf instrument "firstOf: 1" within), timeIsUp <$ environment context]

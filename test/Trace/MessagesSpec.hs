@@ -87,7 +87,7 @@ messagesTraced =
           spanOf n = [s | s <- spans, Inside (spanNumber s) == n]
           calls name = [(s, how) | (s, how) <- ended, spanKind s == Named, name `isPrefixOf` spanName s]
           -- The names and kinds around a span, the innermost first.
-          around' s = concat [(spanKind p, spanName p) : around' p | p <- spanOf (spanParent s)]
+          outer s = concat [(spanKind p, spanName p) : outer p | p <- spanOf (spanParent s)]
           inWatch branch =
             [ (Branch, branch)
             , (Operator, "onMessage")
@@ -107,15 +107,15 @@ messagesTraced =
               sort [spanName s | (s, Succeeded) <- calls "handle"] === map message [1 .. length pauses]
           , counterexample "each span has one end" (sort (map (spanNumber . fst) ended) === sort (map spanNumber spans))
           , conjoin
-              [ counterexample "a handler is in its branch" (around' s === inSpanOf s : inWatch "onMessage: handler")
+              [ counterexample "a handler is in its branch" (outer s === inSpanOf s : inWatch "onMessage: handler")
               | (s, _) <- calls "handle"
               ]
           , conjoin
-              [ counterexample "a task is in its branch" (around' s === inWatch "onMessage: task")
+              [ counterexample "a task is in its branch" (outer s === inWatch "onMessage: task")
               | (s, _) <- calls "task"
               ]
           , conjoin
-              [ counterexample "what delivers is in its branch" (take 1 (around' s) === [(Branch, "both: left")])
+              [ counterexample "what delivers is in its branch" (take 1 (outer s) === [(Branch, "both: left")])
               | (s, _) <- calls "deliver"
               ]
           , conjoin

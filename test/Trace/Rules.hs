@@ -15,7 +15,14 @@ import Data.Maybe (fromMaybe, isJust, isNothing, listToMaybe, maybeToList)
 import Behavior.Internal.Trace.Event
 import qualified Behavior.Sim as Sim
 import Semantics.Path (Seen (..))
-import Semantics.Program (Level (..), Program (..), Transition (IsOver), World (changes, conditions), holds, programName)
+import Semantics.Program
+  ( Level (..)
+  , Program (..)
+  , Transition (IsOver)
+  , World (changes, conditions)
+  , holds
+  , programName
+  )
 import qualified Semantics.Program as Program
 import Trace.Recorder
 
@@ -343,7 +350,7 @@ causes x =
           , any (realToFrac (spanBegan b) >) (Map.lookup endOf' times)
           ]
         operatorEnd = (\(_, _, _, _, e) -> e) <$> Map.lookup (spanNumber o) (over x)
-        program' = snd <$> Map.lookup (spanNumber o) (partOf x)
+        itsProgram = snd <$> Map.lookup (spanNumber o) (partOf x)
         -- None to the left of it had ended, or failed, at an earlier time. (At the same time the order of the
         -- events is not that in which the ends were published.)
         leftmost n ats counts =
@@ -354,7 +361,7 @@ causes x =
               , (at, n', e) <- others
               , n' /= name
               ]
-        operatorAgrees ends' = maybe True (\e -> ends' e || isStopped e || isFault e) operatorEnd
+        operatorAgrees endsSo = maybe True (\e -> endsSo e || isStopped e || isFault e) operatorEnd
      in case (spanName o, cause) of
           (op, SiblingFinished n)
             | op `elem` ["parallel", "firstOf"] ->
@@ -375,7 +382,7 @@ causes x =
           ("scoped", FromOutside "requestStop") -> name == "fork"
           ("withShared", SiblingFinished n) -> not (null (finishedNow n))
           ("withShared", SiblingFailed n) -> not (null (failedNow n))
-          ("timeout", TimeLimit limit) -> case program' of
+          ("timeout", TimeLimit limit) -> case itsProgram of
             Just (Timeout n _) ->
               let isLate (_, _, _, t, _) = t >= realToFrac (spanBegan o) + fromIntegral n
                in limit == fromIntegral n && maybe False isLate (Map.lookup (spanNumber s) (over x))

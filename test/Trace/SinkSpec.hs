@@ -34,9 +34,9 @@ receiving = do
   it "receives all events, in order, before withTrace returns" $ do
     seen <- newIORef []
     withTraceOptions patient [EachEvent (\e -> modifyIORef' seen (e :))] (spans 10000)
-    events' <- reverse <$> readIORef seen
-    [spanNumber s | Began s <- events'] `shouldBe` [1 .. 10000]
-    [spanNumber s | Ended s _ _ <- events'] `shouldBe` [1 .. 10000]
+    received <- reverse <$> readIORef seen
+    [spanNumber s | Began s <- received] `shouldBe` [1 .. 10000]
+    [spanNumber s | Ended s _ _ <- received] `shouldBe` [1 .. 10000]
 
   it "receives them also if the behaviour throws" $ do
     seen <- newIORef []
