@@ -20,7 +20,14 @@ import Behavior (Behavior, Seconds, both, sleep)
 import Behavior.Internal.Runtime (now)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (SimOptions (..), Outcome (OutOfTime, Returned, Threw), Run (..), defaultSimOptions, explain, simulateWith)
+import Behavior.Sim
+  ( SimOptions (..)
+  , Outcome (OutOfTime, Returned, Threw)
+  , Run (..)
+  , defaultSimOptions
+  , explain
+  , simulateWith
+  )
 import Support
 import Watched
 

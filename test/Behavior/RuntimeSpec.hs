@@ -230,7 +230,7 @@ mistakes = do
 
   it "is no property after its end any more" $ do
     for_ [pure (), throwIO (Fault "property")] $ \act -> do
-      _ <- ending (testing (\_ -> act))
+      _ <- ending (testing (const act))
       isNothing <$> currentProperty `shouldReturn` True
 
 scopes :: Spec
