@@ -104,7 +104,7 @@ enlist sim starter name thread here = do
   entrance <- maybe newEmptyMVar (pure . snd) thread
   n <- readIORef (nextNumber sim)
   writeIORef (nextNumber sim) (n + 1)
-  task <- Task n name (fst <$> thread) entrance <$> newIORef here <*> newIORef Nothing <*> newIORef [] <*> pure starter
+  task <- newTask n name (fst <$> thread) entrance starter here
   modifyIORef' (tasks sim) (IntMap.insert n task)
   for_ (taskThread task) $ \there -> modifyIORef' (threads sim) (Map.insert there task)
   task <$ file sim task

@@ -1,11 +1,13 @@
 {-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE RecordWildCards #-}
 
 -- |
 -- The data types of a simulation.
 --
 -- Each simulated thread is a real thread, a 'Task', that runs only while it has the turn, and
 -- otherwise waits at its own gate. Only the task that has the turn reads and writes the state
--- of the simulation, so the state needs no locks.
+-- of the simulation, so the state needs no locks. (It is in many cells, and not in one record: of that a change of
+-- one field would copy all. And at the end of a run the driver writes some of them while a task still runs.)
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.State
@@ -16,6 +18,7 @@ module Behavior.Internal.Sim.State
 
     -- * Tasks
   , Task (..)
+  , newTask
   , Position (..)
   , Operation (..)
   , EnabledCache (..)
@@ -159,38 +162,43 @@ instance Exception Unwind where
 
 -- | A simulation without tasks, on the caller's capability.
 newSim :: SimOptions -> Policy -> IO Sim
-newSim o p = do
-  (here, _) <- threadCapability =<< myThreadId
-  firstDecision <- askAt p
-  box <- newEmptyMVar
-  nowhere <- newIORef Unstarted
-  nothing <- newIORef Nothing
-  none <- newIORef []
-  let noTask = Task (-1) (Label "no task" "") Nothing box nowhere nothing none (-1)
-  Sim o p here
-    <$> newIORef noTask
-    <*> newIORef IntMap.empty
-    <*> newIORef Map.empty
-    <*> newIORef Map.empty
-    <*> newIORef IntMap.empty
-    <*> newIORef Map.empty
-    <*> newIORef 0
-    <*> newIORef 0
-    <*> newIORef 0
-    <*> newIORef (min firstDecision turnLimit)
-    <*> newIORef turnLimit
-    <*> newIORef 0
-    <*> newIORef 0
-    <*> newIORef []
-    <*> newIORef []
-    <*> newIORef []
-    <*> newIORef nothingYet
-    <*> newEmptyMVar
-    <*> newIORef False
-    <*> newIORef False
-    <*> newEmptyMVar
-    <*> newIORef 0
-    <*> newIORef True
+newSim options policyOf = do
+  (capability, _) <- threadCapability =<< myThreadId
+  firstDecision <- askAt policyOf
+  noGate <- newEmptyMVar
+  current <- newTask (-1) (Label "no task" "") Nothing noGate (-1) Unstarted >>= newIORef
+  tasks <- newIORef IntMap.empty
+  threads <- newIORef Map.empty
+  ready <- newIORef Map.empty
+  awaiting <- newIORef IntMap.empty
+  sleepers <- newIORef Map.empty
+  nextNumber <- newIORef 0
+  time <- newIORef 0
+  counter <- newIORef 0
+  nextDecisionAt <- newIORef (min firstDecision turnLimit)
+  rotateAt <- newIORef turnLimit
+  timeMovedAt <- newIORef 0
+  commits <- newIORef 0
+  deviations <- newIORef []
+  history <- newIORef []
+  emitted <- newIORef []
+  reached <- newIORef nothingYet
+  runEnd <- newEmptyMVar
+  unwinding <- newIORef False
+  driverRuns <- newIORef False
+  driverTurn <- newEmptyMVar
+  unwindAttempts <- newIORef 0
+  responded <- newIORef True
+  pure Sim {..}
+
+-- | A task that has this number, label, thread and gate, was started by the task with that number, and is blocked
+-- here.
+newTask :: Int -> Label -> Maybe ThreadId -> MVar () -> Int -> Position -> IO Task
+newTask taskNumber taskLabel taskThread gate parent here = do
+  blockedAt <- newIORef here
+  pendingException <- newIORef Nothing
+  pending <- newIORef []
+  pure Task {..}
 
 -- | The number of points for which one task keeps the turn in the non-preemptive schedule.
 turnLimit :: Int
