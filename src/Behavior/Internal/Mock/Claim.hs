@@ -186,14 +186,14 @@ always s = simple ("always " ++ intervalWords s) (intervalNeeds s) [] $ \record 
 --
 -- @since 0.1.0.0
 comesBefore :: Moment -> Moment -> Claim
-comesBefore a b = simple words' (momentNeeds a ++ momentNeeds b) [premiseOf b] $ \record (Origin origin _) ->
+comesBefore a b = simple text (momentNeeds a ++ momentNeeds b) [premiseOf b] $ \record (Origin origin _) ->
   let after m = filter ((> origin) . fst) (occurrences m record)
    in case (after a, after b) of
         (_, []) -> Nothing
         ((n, _) : _, (k, _) : _) | n < k -> Nothing
         (_, row : _) -> Just ("the second came at " ++ inSeconds (time row) ++ ", without the first", [row])
  where
-  words' = momentWords a ++ " before " ++ momentWords b
+  text = momentWords a ++ " before " ++ momentWords b
 
 infix 7 `comesBefore`
 
@@ -207,31 +207,34 @@ infix 7 `comesBefore`
 whenever :: Moment -> Claim -> Claim
 whenever m claim =
   Claim
-    { claimWords = words' (claimWords claim)
+    { claimWords = given (claimWords claim)
     , claimNeeds = momentNeeds m ++ claimNeeds claim
     , premises = premiseOf m : map later (premises claim)
     , violation = \record origin ->
         listToMaybe
-          [ Violation (words' (broken v)) ("from " ++ inSeconds (time row) ++ " on, " ++ reason v) (row : shown v)
+          [ Violation (given (broken v)) ("from " ++ inSeconds (time row) ++ " on, " ++ reason v) (row : shown v)
           | (row, here) <- after record origin
           , Just v <- [violation claim record here]
           ]
     }
  where
   after record (Origin origin _) = [(row, Origin n (time row)) | row@(n, _) <- occurrences m record, n > origin]
-  later (Premise words'' comes') =
-    Premise (words'' ++ " after " ++ momentWords m) (\record -> any (comes' record . snd) . after record)
-  words' then' = "whenever " ++ momentWords m ++ ", " ++ then'
+  later p =
+    Premise
+      { premiseWords = premiseWords p ++ " after " ++ momentWords m
+      , comes = \record -> any (comes p record . snd) . after record
+      }
+  given consequence = "whenever " ++ momentWords m ++ ", " ++ consequence
 
 -- | A claim that is not made of others: its words, what it needs and presupposes, and why it does not hold, with
 -- the lines that show it.
 simple :: String -> [Need] -> [Premise] -> (Record -> Origin -> Maybe (String, [Line])) -> Claim
-simple words' needs presupposed check =
-  Claim words' needs presupposed (\record origin -> uncurry (Violation words') <$> check record origin)
+simple text needs presupposed check =
+  Claim text needs presupposed (\record origin -> uncurry (Violation text) <$> check record origin)
 
 -- | A claim about when a moment occurs.
 claimOf :: String -> [Premise] -> Moment -> (Record -> Origin -> [Line] -> Maybe (String, [Line])) -> Claim
-claimOf words' presupposed m check = simple words' (momentNeeds m) presupposed $ \record origin@(Origin after _) ->
+claimOf text presupposed m check = simple text (momentNeeds m) presupposed $ \record origin@(Origin after _) ->
   check record origin (filter ((> after) . fst) (occurrences m record))
 
 -- | Whether a claim holds. With hspec: @record \`shouldSatisfy\` holds claim@.

@@ -99,7 +99,7 @@ partialCondition mock name changes = do
   rest <- newTVarIO (if isJust initial then drop 1 changes else changes)
   let c = Condition mock name show first rest kinds
   for_ (initial >>= snd) $ \a -> recordEntry mock (entry c 0 (Is (show a)))
-  registerPending mock $ \until' -> (\(_, _, made) -> made) <$> due c (<= until')
+  registerPending mock $ \end -> (\(_, _, made) -> made) <$> due c (<= end)
   pure c
  where
   initial = listToMaybe [(t, a) | (t, a) <- take 1 changes, t == 0]

@@ -112,10 +112,10 @@ fullName entry
 
 -- | The lines of a timeline.
 timeline :: [RecordEntry] -> [String]
-timeline lines' = [padded (inSeconds (entryTime entry)) ++ "  " ++ show entry | entry <- lines']
+timeline entries = [padded (inSeconds (entryTime entry)) ++ "  " ++ show entry | entry <- entries]
  where
   padded time = replicate (width - length time) ' ' ++ time
-  width = maximum (0 : map (length . inSeconds . entryTime) lines')
+  width = maximum (0 : map (length . inSeconds . entryTime) entries)
 
 -- | A time rounded to microseconds, which hides the rounding errors of sums.
 inSeconds :: Seconds -> String

@@ -22,7 +22,7 @@ import Behavior.Internal.Trace.Event
 -- reacted, and what it started. The events are given latest first. (One that reacts less than once in a thousand of
 -- the scheduling points that the limit allows is not what uses them up.)
 circles :: Int -> Seconds -> [Event] -> [String]
-circles limit now' latestFirst =
+circles limit moment latestFirst =
   [ described rs
   | ((Inside operator, _), rs@(_ : _ : _)) <- Map.toList reactions
   , 1000 * length rs >= limit
@@ -33,9 +33,9 @@ circles limit now' latestFirst =
   reactions = Map.fromListWith (++) [((reactionParent r, reactionOperator r), [r]) | Reacted r <- recent]
   recent = takeWhile happensNow latestFirst
   happensNow = \case
-    Began s -> spanBegan s >= now'
-    Ended _ t _ -> t >= now'
-    Reacted r -> reactionTime r >= now'
+    Began s -> spanBegan s >= moment
+    Ended _ t _ -> t >= moment
+    Reacted r -> reactionTime r >= moment
     Lost _ -> True
 
 described :: [Reaction] -> String

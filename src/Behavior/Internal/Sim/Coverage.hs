@@ -14,7 +14,7 @@ module Behavior.Internal.Sim.Coverage
 
     -- * Many runs
   , Coverage
-  , nothing
+  , noCoverage
   , withRun
   , started
   , neverStarted
@@ -93,8 +93,8 @@ data Coverage = Coverage
   }
 
 -- | That of no run.
-nothing :: Coverage
-nothing = Coverage Set.empty Map.empty Map.empty
+noCoverage :: Coverage
+noCoverage = Coverage Set.empty Map.empty Map.empty
 
 -- | With that of a further run.
 withRun :: [Event] -> Reached -> Map String Bool -> Coverage -> Coverage
@@ -110,12 +110,12 @@ withRun happened reached premises before =
     | Set.member name names = names
     | otherwise = Set.insert (settledText name) names
   -- (A behaviour that runs itself inside of itself is one.)
-  join all' (Inner names inside) =
+  join others (Inner names inside) =
     let outside = map head (group (reverse (map (take 100 . settledText) names)))
-        old = Map.findWithDefault Map.empty outside all'
+        old = Map.findWithDefault Map.empty outside others
      in if Map.isSubmapOfBy (Map.isSubmapOfBy (<=)) inside old
-          then all'
-          else Map.insert outside (Map.unionWith (Map.unionWith (||)) old inside) all'
+          then others
+          else Map.insert outside (Map.unionWith (Map.unionWith (||)) old inside) others
 
 -- | The names of all that was started: behaviours that have a name, scripted actions, and branches.
 started :: Coverage -> [String]

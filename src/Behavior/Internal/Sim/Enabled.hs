@@ -35,9 +35,9 @@ import Behavior.Internal.Sim.State
 file :: Sim -> Task -> IO ()
 file sim task = do
   unfile sim task
-  place' <- readIORef (blockedAt task)
-  certain <- canRaise place'
-  case place' of
+  position <- readIORef (blockedAt task)
+  certain <- canRaise position
+  case position of
     Gone -> pure ()
     _ | certain -> intoReady
     Unstarted -> intoReady
@@ -52,10 +52,10 @@ file sim task = do
  where
   intoReady = modifyIORef' (ready sim) (Map.insert (taskNumber task) task)
   -- Then the task is enabled in any case: if its operation has to wait, it receives the exception.
-  canRaise place' = do
+  canRaise position = do
     arrived <- isJust <$> readIORef (pendingException task)
     waiting <- not . null <$> readIORef (pending task)
-    pure $ arrived || case place' of
+    pure $ arrived || case position of
       Before MaskedInterruptible _ -> waiting
       _ -> False
 

@@ -14,21 +14,15 @@ module Behavior.Internal.Sim.Explore
 import Control.Exception hiding (Deadlock)
 import Data.Foldable (toList, traverse_)
 import Data.IORef
-import Data.Map.Strict (Map)
-import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
 import qualified Data.Sequence as Seq
 
-import Behavior.Internal.Failure (Behavior, isCancellation)
-import Behavior.Internal.Runtime.Property
-import Behavior.Internal.Sim.Coverage
+import Behavior.Internal.Failure (Behavior)
 import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Prefix
-import Behavior.Internal.Sim.Report
-import Behavior.Internal.Sim.Simulate
+import Behavior.Internal.Sim.Trial
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Trace.Event (Event)
 
 -- $setup
 -- >>> import Behavior
@@ -44,69 +38,6 @@ instance Show Unrepeatable where
          \a clock, a random number, a thread of forkIO, what an earlier run left behind?"
 
 instance Exception Unrepeatable
-
--- | One run of the property: its exception, and the simulated run.
-data Trial = Trial
-  { thrown :: Maybe SomeException
-  , otherEnd :: Maybe String
-  -- ^ How the run ended, if it did not return a result.
-  , deviations :: [(Int, Int)]
-  -- ^ The choices that deviate from the non-preemptive schedule.
-  , happened :: [Step]
-  , traceOfRun :: [Event]
-  , size :: Int
-  , reached :: Reached
-  -- ^ What it could start, and has.
-  , claimed :: Map String Bool
-  -- ^ What its claims presuppose, and whether it came.
-  }
-
--- | A trial that has not run anything.
-noTrial :: Trial
-noTrial =
-  Trial
-    { thrown = Nothing
-    , otherEnd = Nothing
-    , deviations = []
-    , happened = []
-    , traceOfRun = []
-    , size = 0
-    , reached = nothingYet
-    , claimed = Map.empty
-    }
-
--- | The runs so far.
-data Tally = Tally
-  { tried :: !Int
-  , points :: !Int
-  , otherEnds :: !(Map String Int)
-  -- ^ How they ended that did not return.
-  , covered :: !Coverage
-  }
-
-noRun :: Tally
-noRun = Tally {tried = 0, points = 0, otherEnds = Map.empty, covered = nothing}
-
-counting :: Tally -> Trial -> Tally
-counting before t =
-  Tally
-    { tried = tried before + 1
-    , points = points before + size t
-    , otherEnds = maybe id (\end -> Map.insertWith (+) end 1) (otherEnd t) (otherEnds before)
-    , covered = withRun (traceOfRun t) (reached t) (claimed t) (covered before)
-    }
-
-reported :: Bool -> Tally -> Report
-reported all' Tally {tried = n, points = total, otherEnds = ends, covered = covered'} =
-  Report
-    { reportSchedules = n
-    , reportComplete = all'
-    , reportPoints = total
-    , reportEnds = Map.toList ends
-    , reportStarted = started covered'
-    , reportNeverStarted = neverStarted covered'
-    , reportNeverCame = neverCame covered'
-    }
 
 -- | Runs a property under many schedules, until one fails.
 --
@@ -174,29 +105,29 @@ tryExplore plan property = case planSearch plan of
       , schedulesTried = n
       , foundBy = plan
       }
-  try' chooser' = tryRun o chooser' property
+  tryUnder choosing = tryRun o choosing property
   refused why n = throwIO (ErrorCall ("explore: " ++ why ++ ", and not " ++ show n))
 
   only s onFailure = do
-    t <- try' (policy s)
+    t <- tryUnder (policy s)
     case thrown t of
-      Nothing -> pure (Right (reported True (counting noRun t)))
+      Nothing -> pure (Right (reported True (counting noTrials t)))
       Just e -> Left <$> onFailure e t
 
-  randomSearch n seed = go 1 noRun
+  randomSearch n seed = go 1 noTrials
    where
     go i !before
       | i > n = pure (Right (reported True before))
       | otherwise = do
           -- (So two seeds have different schedules, unless a plan has more than a million.)
-          t <- try' (policy (Seeded (seed * 1000003 + i)))
+          t <- tryUnder (policy (Seeded (seed * 1000003 + i)))
           case thrown t of
             Nothing -> go (i + 1) (counting before t)
             Just e -> Left <$> reduced i e t
 
   -- The queue is a stack. It holds the alternatives to the decisions of the last schedule,
   -- and to those of the prefixes that this schedule continues.
-  fullSearch k limit = go 1 noRun (emptyPrefix k) []
+  fullSearch k limit = go 1 noTrials (emptyPrefix k) []
    where
     go :: Int -> Tally -> Prefix -> [Alternatives] -> IO (Either Counterexample Report)
     go n !before prefix others
@@ -212,7 +143,7 @@ tryExplore plan property = case planSearch plan of
   -- alternatives to the decisions after them in front of the queue.
   branching prefix others = do
     queue <- newIORef others
-    t <- try' . fully (choices prefix) $ \d -> traverse_ (\more -> modifyIORef' queue (more :)) (alternatives prefix d)
+    t <- tryUnder . fully (choices prefix) $ \d -> traverse_ (\more -> modifyIORef' queue (more :)) (alternatives prefix d)
     (,) t <$> readIORef queue
 
   reduced i e t = do
@@ -253,7 +184,7 @@ tryExplore plan property = case planSearch plan of
     attemptAll budget chunk (candidate : more) these why
       | budget <= 0 = pure (these, why)
       | otherwise = do
-          t <- try' (preempting False candidate)
+          t <- tryUnder (preempting False candidate)
           case thrown t of
             Just e'
               | fewer <- deviations t
@@ -261,47 +192,3 @@ tryExplore plan property = case planSearch plan of
                   go (budget - 1) (min chunk (length fewer)) fewer e'
             _ -> attemptAll (budget - 1) chunk more these why
   without n these = [take i these ++ drop (i + n) these | i <- [0, n .. length these - 1]]
-
--- | Runs the property once.
-tryRun :: SimOptions -> IO Policy -> ((Behavior a -> IO (Run a)) -> IO ()) -> IO Trial
-tryRun o choosing property = testing $ \this -> do
-  made <- newIORef Nothing
-  let simulating act = do
-        before <- readIORef made
-        case before of
-          Just _ -> mistake "explore: a property simulates only once"
-          Nothing -> do
-            chooser' <- choosing
-            (run, startable) <- simulateBy o (Just this) chooser' act
-            let deviating = case runSchedule run of
-                  Preempting s -> s
-                  _ -> []
-            writeIORef made . Just $
-              noTrial
-                { otherEnd = otherEndOf (outcome run)
-                , deviations = deviating
-                , happened = steps run
-                , traceOfRun = events run
-                , size = runPoints run
-                , reached = startable
-                }
-            case outcome run of
-              BlockedOutside _ _ -> improper run
-              ExternalWakeup _ -> improper run
-              TooSlow _ _ -> improper run
-              ScheduleMismatch _ -> improper run
-              _ -> run <$ throwMistake
-      improper run = mistake (explain (outcome run))
-      mistake why = keepMistake this (ErrorCall why) >> throwIO (ErrorCall why)
-      throwMistake = mistakeOf this >>= mapM_ throwIO
-  end <- try ((property simulating >>= evaluate) <* throwMistake)
-  trial <- readIORef made
-  presupposed <- premisesOf this
-  case (end, trial) of
-    (Right (), Just simulated) -> pure simulated {claimed = presupposed}
-    (Right (), Nothing) -> throwIO . ErrorCall $
-      "explore: the property has simulated nothing, so it shows nothing: \
-      \it is given a function, and has to simulate with it"
-    (Left e, _)
-      | isCancellation e -> throwIO e
-      | otherwise -> pure (fromMaybe noTrial trial) {thrown = Just e}

@@ -81,9 +81,9 @@ withdraw sim target p = do
 -- | Withdraws all exceptions that are pending for the target: the target, or the run, has ended.
 withdrawAll :: Sim -> Task -> IO ()
 withdrawAll sim target = do
-  all' <- readIORef (pending target)
+  waiting <- readIORef (pending target)
   writeIORef (pending target) []
-  for_ all' $ \p -> release p >> wakeSender sim p
+  for_ waiting $ \p -> release p >> wakeSender sim p
 
 -- | Ends the helper thread, and returns when it has ended.
 release :: Pending -> IO ()
@@ -102,13 +102,13 @@ wakeSender sim p = for_ (sender p) (file sim)
 settle :: Sim -> IO ()
 settle sim = do
   me <- readIORef (current sim)
-  all' <- readIORef (pending me)
-  unless (null all') (settlePending sim me all')
+  waiting <- readIORef (pending me)
+  unless (null waiting) (settlePending sim me waiting)
 {-# INLINE settle #-}
 
 settlePending :: Sim -> Task -> [Pending] -> IO ()
-settlePending sim me all' = do
-  (still, gone) <- partitionM (fmap isBlocked . threadStatus . throwingThread) all'
+settlePending sim me waiting = do
+  (still, gone) <- partitionM (fmap isBlocked . threadStatus . throwingThread) waiting
   writeIORef (pending me) still
   for_ gone $ \p -> do
     untilOver p

@@ -115,8 +115,8 @@ operation :: Sim -> Operation -> IO ()
 operation sim op = do
   settle sim
   quick <- keepsTurn sim
-  possible' <- if quick then possible sim op else pure False
-  unless possible' (reschedule sim op)
+  isPossible <- if quick then possible sim op else pure False
+  unless isPossible (reschedule sim op)
 {-# INLINE operation #-}
 
 -- | Counts a scheduling point. The result: whether the running task keeps the turn there, as
@@ -175,8 +175,8 @@ reschedule sim op = do
         arrive sim me
         waiting <- readIORef (pending me)
         when (masking == MaskedInterruptible && not (null waiting)) $ do
-          possible' <- possible sim op
-          unless possible' receive
+          isPossible <- possible sim op
+          unless isPossible receive
 
 turnTo :: Sim -> Task -> IO ()
 turnTo sim task = writeIORef (current sim) task >> putMVar (gate task) ()

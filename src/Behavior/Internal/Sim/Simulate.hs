@@ -85,13 +85,13 @@ simulate = simulateWith defaultSimOptions
 -- @since 0.1.0.0
 simulateWith :: SimOptions -> Behavior a -> IO (Run a)
 simulateWith o act = do
-  chooser' <- policy (scheduled o)
-  fst <$> simulateBy o Nothing chooser' act
+  chooser <- policy (scheduled o)
+  fst <$> simulateBy o Nothing chooser act
 
 -- | 'simulateWith' under the given policy, for the property that runs it. It also gives what the run could start,
 -- and has.
 simulateBy :: SimOptions -> Maybe Property -> Policy -> Behavior a -> IO (Run a, Reached)
-simulateBy o property chooser' act = do
+simulateBy o property chooser act = do
   nested <- simulator
   when (isJust nested) . throwIO . ErrorCall $
     "simulate: a simulation inside of a simulation: run the inner behaviour as part of the outer one"
@@ -100,7 +100,7 @@ simulateBy o property chooser' act = do
     "livelockLimit: a number of scheduling points is zero or more, not " ++ show (livelockLimit o)
   result <- newIORef Nothing
   n <- atomicModifyIORef' simulationNumber (\k -> (k + 1, k))
-  sim <- newSim o chooser'
+  sim <- newSim o chooser
   root <- placeIn [] <$> traceOf sim
   mask $ \restore -> withBackend n (simulation n property sim) . watched n sim $ do
     let run unmasked = try (inPlace (Just root) unmasked) >>= writeIORef result . Just
@@ -109,7 +109,7 @@ simulateBy o property chooser' act = do
     putMVar (gate main) ()
     verdict <- try (restore (takeMVar (runEnd sim)))
     left <- fmap taskLabel . filter (isJust . taskThread) . IntMap.elems <$> readIORef (tasks sim)
-    time' <- readIORef (time sim)
+    endTime <- readIORef (time sim)
     made <- reverse <$> readIORef (history sim)
     happened <- map (runIdentity . traverseTexts (Identity . settledText)) . reverse <$> readIORef (emitted sim)
     count <- readIORef (counter sim)
@@ -117,14 +117,14 @@ simulateBy o property chooser' act = do
     uninterruptibleMask_ (unwind sim verdict)
     end <- readIORef result
     deviating <- reverse <$> readIORef (deviations sim)
-    rest <- unused chooser'
+    rest <- unused chooser
     case verdict of
       Left e -> throwIO (e :: SomeException)
       Right v ->
         pure
           ( Run
               { outcome = outcomeOf v end rest
-              , finished = time'
+              , finished = endTime
               , steps = made
               , events = happened
               , runSchedule = Preempting deviating

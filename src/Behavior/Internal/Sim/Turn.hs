@@ -46,15 +46,15 @@ choose sim me = do
     Just (first, only)
       | Map.size enabledTasks == 1 -> run n rotating only
       | otherwise -> do
-          let canGoOn' = Map.member mine enabledTasks && not rotating
+          let mayGoOn = Map.member mine enabledTasks && not rotating
               usualChoice
-                | canGoOn' = mine
+                | mayGoOn = mine
                 | otherwise = maybe first fst (Map.lookupGT mine enabledTasks)
-          decision <- decided sim n usualChoice canGoOn' enabledTasks
+          decision <- decided sim n usualChoice mayGoOn enabledTasks
           case decision of
             Nothing -> pure Nothing
             Just task -> do
-              when (canGoOn' && not (isMe task)) (recordDetail sim IsPreempted)
+              when (mayGoOn && not (isMe task)) (recordDetail sim IsPreempted)
               run n rotating task
  where
   mine = maybe (-1) taskNumber me
@@ -80,13 +80,13 @@ choose sim me = do
 
 -- | Lets the policy choose one of these tasks. 'Nothing': the run has ended here.
 decided :: Sim -> Int -> Int -> Bool -> Map Int Task -> IO (Maybe Task)
-decided sim n usualChoice canGoOn' enabledTasks = do
+decided sim n usualChoice mayGoOn enabledTasks = do
   chosen <-
     decide (policyOf sim) $
       Decision
         { decisionPoint = n
         , usual = usualChoice
-        , canGoOn = canGoOn'
+        , canGoOn = mayGoOn
         , candidates = Map.keys enabledTasks
         , candidateCount = Map.size enabledTasks
         , candidateAt = \k -> fst (Map.elemAt k enabledTasks)
@@ -160,8 +160,8 @@ waitingTasks sim these = do
     what <- reason alive task <$> readIORef (blockedAt task)
     pure (Waiting (taskLabel task) (what ++ inPath (maybe [] path here)))
   sent target = do
-    all' <- readIORef (pending target)
-    pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- all', isNothing (sender p)]
+    late <- readIORef (pending target)
+    pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- late, isNothing (sender p)]
   toReceive target = show (taskLabel target) ++ " to receive an exception"
   reason alive task = \case
     Before _ (Transaction _ _) ->

@@ -67,7 +67,7 @@ watchLoop seen idle = do
   (sims, _) <- readIORef watchedSims
   if Map.null sims && idle > 20
     then do
-      go <- change (\(now', _) -> if Map.null now' then ((now', False), False) else ((now', True), True))
+      go <- change (\(left, _) -> if Map.null left then ((left, False), False) else ((left, True), True))
       when go (watchLoop seen 0)
     else do
       samples <- Map.traverseWithKey (\n sim -> check sim (Map.lookup n seen)) sims
