@@ -106,6 +106,7 @@ import Behavior.Internal.Mock.Action
 import Behavior.Internal.Mock.Claim
 import Behavior.Internal.Mock.Condition
 import Behavior.Internal.Mock.Driver
+import Behavior.Internal.Mock.Interval
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Script

@@ -26,6 +26,7 @@ import Data.Foldable (for_)
 import Data.List (intercalate, sortOn)
 import Data.Maybe (listToMaybe)
 
+import Behavior.Internal.Mock.Interval
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
@@ -154,17 +155,17 @@ always :: Interval -> Claim
 always s = simple ("always " ++ intervalWords s) (intervalNeeds s) [] $ \record (Origin origin since) ->
   let ranges = intervalRanges s record
       rows = numbered record
-      end = Place (recordEnd record) After 0
+      end = Instant (recordEnd record) After 0
       -- It is going on all the time if it is at the entries, where one of its ranges ends, and at the end.
-      places =
+      instants =
         [(at row, "at", time row) | row@(n, entry) <- rows, n > origin, not (isInitial entry)]
-          ++ [(p, "after", t - tolerance) | p@(Place t _ _) <- map to ranges, p > Place since At origin, p < end]
+          ++ [(p, "after", t - tolerance) | p@(Instant t _ _) <- map to ranges, p > Instant since At origin, p < end]
           ++ [(end, "at", recordEnd record)]
-      isIncluded (place, _, _) = any (\range -> from range <= place && place < to range) ranges
-   in case sortOn (\(place, _, _) -> place) (filter (not . isIncluded) places) of
+      isIncluded (instant, _, _) = any (\range -> from range <= instant && instant < to range) ranges
+   in case sortOn (\(instant, _, _) -> instant) (filter (not . isIncluded) instants) of
         [] -> Nothing
-        (place, word, t) : _ ->
-          Just ("it was not so " ++ word ++ " " ++ inSeconds t, take 1 (reverse (takeWhile ((<= place) . at) rows)))
+        (instant, word, t) : _ ->
+          Just ("it was not so " ++ word ++ " " ++ inSeconds t, take 1 (reverse (takeWhile ((<= instant) . at) rows)))
  where
   -- The entries that the set-up of the world makes: not everything exists yet.
   isInitial entry = case entryKind entry of

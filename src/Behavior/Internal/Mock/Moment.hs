@@ -1,17 +1,11 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The parts of a record that claims are about: moments and intervals.
+-- Moments: what claims are about that takes no time; also with regard to intervals.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Moment
-  ( Line
-  , numbered
-  , unfitIn
-  , time
-
-    -- * Moments
-  , Moment (..)
+  ( Moment (..)
   , startOf
   , endOf
   , successOf
@@ -25,30 +19,13 @@ module Behavior.Internal.Mock.Moment
   , outside
   , overlapping
   , countOf
-
-    -- * Intervals
-  , Interval (..)
-  , running
-  , being
-  , heldFor
-  , shortlyAfter
-  , Range (..)
-
-    -- * Premises
-  , Premise (..)
-  , Origin (..)
   , premiseOf
-
-    -- * Places
-  , Place (..)
-  , Side (..)
-  , at
-  , tolerance
+  , shortlyAfter
   ) where
 
-import Data.List (find, intercalate)
-import Data.Maybe (mapMaybe)
+import Data.List (intercalate)
 
+import Behavior.Internal.Mock.Interval
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
 import Behavior.Internal.Runtime (Seconds)
@@ -64,14 +41,6 @@ import Behavior.Internal.Runtime (Seconds)
 -- >>> let entries = sortOn entryTime (low ++ drive ++ charge)
 -- >>> let record = Record [("low", ACondition), ("drive", AnAction), ("charge", AnAction)] entries 9
 -- >>> let check claim = either putStr pure (verdict claim record)
-
--- | An entry of a record, with its number from 0. (Where something is shown that has no entry of its
--- own, the last entry before it, with another time.)
-type Line = (Int, RecordEntry)
-
--- | The time that a line shows.
-time :: Line -> Seconds
-time = entryTime . snd
 
 -- | A kind of record entry, of which there may be none, one or many:
 -- @startOf "recharge"@.
@@ -143,10 +112,6 @@ becoming name value =
  where
   shown = show value
 
--- | That something has this value.
-needOf :: String -> String -> String -> Need
-needOf name verb shown = Need name (verb ++ shown) [ASensor, ACondition] (Just shown)
-
 -- | This text was recorded by 'Behavior.Sim.Mock.note', or by a 'Behavior.Sim.Mock.driver'. It may be any
 -- text: one that nothing notes never comes. (If the record has it with other quotes, that is an error.)
 --
@@ -162,17 +127,6 @@ momentOf kinds verb isIt name =
     , momentPremises = []
     , occurrences = filter (\(_, entry) -> entry `isAbout` name && isIt (entryKind entry)) . numbered
     }
-
-isAbout :: RecordEntry -> String -> Bool
-isAbout entry name = name `elem` [entrySubject entry, fullName entry]
-
-isEnd :: EntryKind -> Bool
-isEnd kind = case kind of
-  Succeeds -> True
-  Fails _ -> True
-  Faults _ -> True
-  Stops -> True
-  _ -> False
 
 -- | Any of these. Of no moments it is an 'Control.Exception.ErrorCall': none of them could ever come.
 --
@@ -273,130 +227,6 @@ countOf m record = case unfitIn record (momentNeeds m) of
   Just why -> errorWithoutStackTrace why
   Nothing -> length (occurrences m record)
 
--- | Why the first of the needs that does not fit the record does not, if there is one.
-unfitIn :: Record -> [Need] -> Maybe String
-unfitIn record = unfit (recordSubjects record) (mapMaybe shown (recordEntries record))
- where
-  shown e = case entryKind e of
-    Is value -> Just (entrySubject e, value)
-    Becomes value -> Just (entrySubject e, value)
-    Noted -> Just ("", entrySubject e)
-    _ | null (entryArgument e) -> Nothing
-    _ -> Just (entrySubject e, entryArgument e)
-
--- | The lines of a record.
-numbered :: Record -> [Line]
-numbered = zip [0 ..] . recordEntries
-
--- | Something that has a start and an end: an action that runs, or a condition that has
--- a certain value.
---
--- @since 0.1.0.0
-data Interval = Interval
-  { intervalWords :: String
-  , intervalNeeds :: [Need]
-  , intervalRanges :: Record -> [Range]
-  -- ^ Each time that it is going on, in order. None starts after the end of the record.
-  }
-
--- | One time that an interval is going on.
-data Range = Range
-  { from :: Place
-  , to :: Place
-  , start :: Line
-  -- ^ The line that shows its start, at the time of the start.
-  }
-
--- | A place in a record: the time; whether it is before or after all that happens at that time, or at
--- the entry with the given number.
-data Place = Place Seconds Side Int
-  deriving (Eq, Ord)
-
--- | In order.
-data Side = Before | At | After
-  deriving (Eq, Ord)
-
--- | The place of a line.
-at :: Line -> Place
-at (n, entry) = Place (entryTime entry) At n
-
--- | Whether a place is between the start and the end.
-isInside :: Place -> Range -> Bool
-isInside place range = from range < place && place < to range
-
--- | The action runs: from its beginning to its end, cleanup included.
---
--- @since 0.1.0.0
-running :: String -> Interval
-running name =
-  Interval (show name ++ " is running") [Need name "is running" anyAction Nothing] $
-    rangesFrom (\e -> e `isAbout` name && entryKind e == Begins) $ \begun e ->
-      fullName e == fullName begun && entryCall e == entryCall begun && isEnd (entryKind e)
-
--- | The condition, or the value that the sensor reads, is this.
---
--- @since 0.1.0.0
-being :: Show a => String -> a -> Interval
-being name value =
-  Interval (show name ++ " is " ++ shown) [needOf name "is " shown] $
-    rangesFrom (\e -> e `isAbout` name && entryKind e `elem` [Is shown, Becomes shown]) $ \_ e ->
-      e `isAbout` name && changes (entryKind e)
- where
-  shown = show value
-  changes (Becomes _) = True
-  changes kind = kind == LosesValue
-
-rangesFrom :: (RecordEntry -> Bool) -> (RecordEntry -> RecordEntry -> Bool) -> Record -> [Range]
-rangesFrom begins ends record =
-  [ Range (at row) (maybe openEnd at (find (ends entry . snd) (drop (n + 1) rows))) row
-  | row@(n, entry) <- rows
-  , begins entry
-  ]
- where
-  rows = numbered record
-  openEnd = Place (1 / 0) After 0
-
--- | Only after it has been going on for the given number of seconds: so what happens at the moment of its
--- start, or shortly after it, does not count. A negative number or NaN is rejected with an
--- 'Control.Exception.ErrorCall'.
---
--- >>> holds (never (running "drive" `overlapping` being "low" True)) record
--- False
--- >>> holds (never (running "drive" `overlapping` (being "low" True `heldFor` 1))) record
--- True
--- >>> check (never (running "drive" `overlapping` (being "low" True `heldFor` 0.1)))
--- This does not hold: never "drive" is running while "low" is True for over 0.1 s.
--- It was so at 4.1 s:
---     ...
---     0.0 s  drive: begins
---     4.0 s  low: becomes True
---   > 4.0 s  drive: stop requested
---     5.0 s  drive: has stopped
---     5.0 s  charge: begins
---     ...
---
--- @since 0.1.0.0
-heldFor :: Interval -> Seconds -> Interval
-heldFor s seconds =
-  checked "heldFor" seconds `seq` s
-    { intervalWords = intervalWords s ++ " for over " ++ inSeconds seconds
-    , intervalRanges = \record -> mapMaybe (later record) (intervalRanges s record)
-    }
- where
-  later record range
-    | begun < to range && begun < Place (recordEnd record) Before 0 =
-        Just range {from = begun, start = (shown, entry {entryTime = due})}
-    | otherwise = Nothing
-   where
-    (n, entry) = start range
-    due = entryTime entry + seconds
-    -- After all that happens at that time. Those that are due at the same time keep their order.
-    begun = Place (due + tolerance) After (order (from range))
-    shown = last (n : map fst (takeWhile (\row -> at row < begun) (drop n (numbered record))))
-  order (Place _ _ n) = n
-
-infixl 9 `heldFor`
-
 -- | The given number of seconds after each time that it happens, and the moment itself: all that has the
 -- same time, whether it is recorded before or after it. A negative number or NaN is rejected with an
 -- 'Control.Exception.ErrorCall'.
@@ -419,38 +249,12 @@ shortlyAfter seconds m =
     { intervalWords = "within " ++ inSeconds seconds ++ " after " ++ momentWords m
     , intervalNeeds = momentNeeds m
     , intervalRanges = \record ->
-        [ Range (Place (t - tolerance) Before n) (Place (t + seconds + tolerance) After (-1)) row
+        [ Range (Instant (t - tolerance) Before n) (Instant (t + seconds + tolerance) After (-1)) row
         | row@(n, entry) <- occurrences m record
         , let t = entryTime entry
         ]
     }
 
--- | What has to come, or a claim holds whatever happens.
-data Premise = Premise
-  { premiseWords :: String
-  , comes :: Record -> Origin -> Bool
-  -- ^ Whether it comes after the origin.
-  }
-
--- | The entry after which a claim is checked, and its time. (For the whole record the
--- entry is -1.)
-data Origin = Origin Int Seconds
-
 -- | The moment comes.
 premiseOf :: Moment -> Premise
 premiseOf m = Premise (momentWords m) $ \record (Origin origin _) -> any ((> origin) . fst) (occurrences m record)
-
--- | The interval is going on.
-ofInterval :: Interval -> Premise
-ofInterval s = Premise (intervalWords s) $ \record (Origin origin since) ->
-  any ((> Place since At origin) . to) (intervalRanges s record)
-
--- | Times that differ by less are the same: for example a sum and the time of a timer.
-tolerance :: Seconds
-tolerance = 0.000001
-
--- | Rejects a number that is not zero or more.
-checked :: String -> Seconds -> ()
-checked name seconds
-  | seconds >= 0 = ()
-  | otherwise = errorWithoutStackTrace (name ++ ": zero or more seconds, not " ++ show seconds)

@@ -12,11 +12,13 @@ module Behavior.Internal.Mock.Record
   , fullName
   , timeline
   , inSeconds
+  , unfitIn
   ) where
 
 import Data.List (sortOn)
+import Data.Maybe (mapMaybe)
 
-import Behavior.Internal.Mock.Subject (SubjectKind)
+import Behavior.Internal.Mock.Subject (Need, SubjectKind, unfit)
 import Behavior.Internal.Runtime (Seconds)
 
 -- | The record of a mock world: what has happened in it, in order. It is shown as a
@@ -122,3 +124,14 @@ inSeconds :: Seconds -> String
 inSeconds s
   | abs s < 1e9 = show (fromInteger (round (s * 1000000)) / 1000000 :: Seconds) ++ " s"
   | otherwise = show s ++ " s"
+
+-- | Why the first of the needs that does not fit the record does not, if there is one.
+unfitIn :: Record -> [Need] -> Maybe String
+unfitIn record = unfit (recordSubjects record) (mapMaybe shown (recordEntries record))
+ where
+  shown e = case entryKind e of
+    Is value -> Just (entrySubject e, value)
+    Becomes value -> Just (entrySubject e, value)
+    Noted -> Just ("", entrySubject e)
+    _ | null (entryArgument e) -> Nothing
+    _ -> Just (entrySubject e, entryArgument e)

@@ -143,7 +143,8 @@ tryExplore plan property = case planSearch plan of
   -- alternatives to the decisions after them in front of the queue.
   branching prefix others = do
     queue <- newIORef others
-    t <- tryUnder . fully (choices prefix) $ \d -> traverse_ (\more -> modifyIORef' queue (more :)) (alternatives prefix d)
+    t <- tryUnder . fully (choices prefix) $ \d ->
+      traverse_ (\more -> modifyIORef' queue (more :)) (alternatives prefix d)
     (,) t <$> readIORef queue
 
   reduced i e t = do
