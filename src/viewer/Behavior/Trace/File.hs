@@ -186,12 +186,10 @@ parseTrace bytes = case Bytes.split '\n' bytes of
   go !n !texts !lostBefore before = \case
     [] -> Right (reverse before, Nothing)
     [end] | Bytes.null end -> Right (reverse before, Nothing)
-    content : after -> case decodeEvent content of
-      Right (Lost more)
+    content : after -> case decodeSharing texts content of
+      Right (Lost more, _)
         | more > maxBound - lostBefore -> Left (DamagedLine n "more events were lost than can be counted")
-      Right this
-        | (this', texts') <- sharing texts this ->
-            go (n + 1) texts' (lostBefore + lostIn this) (this' : before) after
+      Right (this, texts') -> go (n + 1) texts' (lostBefore + lostIn this) (this : before) after
       Left (NotJson _) | null after -> Right (reverse before, Just (TornLine n (fromIntegral (Bytes.length content))))
       Left (NotJson why) -> Left (DamagedLine n ("this is not a line of JSON: " ++ why))
       Left (NotAnEvent why) -> Left (DamagedLine n ("this is no event: " ++ why))

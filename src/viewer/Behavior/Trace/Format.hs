@@ -13,17 +13,18 @@ module Behavior.Trace.Format
     -- * Events
   , encodeEvent
   , decodeEvent
+  , decodeSharing
   , NoEvent (..)
   ) where
 
 import Control.Monad (when)
 import Data.Aeson (Object, Value (..), eitherDecode, parseJSON, withObject, withText, (.:), (.:?))
 import Data.Aeson.Encoding (Encoding, Series, int, list, pair, pairs)
-import Data.Aeson.Types (Key, Parser, parseEither)
+import Data.Aeson.Types (Key, Parser, explicitParseField, explicitParseFieldMaybe, parseEither, typeMismatch)
 import Data.ByteString.Builder (Builder, char7)
 import qualified Data.ByteString.Lazy as Bytes
-import Data.List (intercalate)
 import Data.Maybe (fromMaybe)
+import Data.Text (Text)
 import qualified Data.Text as Text
 import Data.Time.Clock (UTCTime)
 import Data.Time.Format.ISO8601 (iso8601Show)
@@ -32,6 +33,7 @@ import Behavior.Internal.Seconds (Seconds (..))
 import Behavior.Trace
 import Behavior.Trace.Describe (inertUpTo)
 import Behavior.Trace.Json
+import Behavior.Trace.Sharing
 
 -- | The first line of a file.
 --
@@ -139,11 +141,11 @@ seconds (Seconds t) = number t
 optional :: Key -> (a -> Encoding) -> Maybe a -> Series
 optional key encode = maybe mempty (pair key . encode)
 
-kinds :: [(String, SpanKind)]
+kinds :: [(Text, SpanKind)]
 kinds = [("named", Named), ("operator", Operator), ("branch", Branch)]
 
-nameIn :: Eq a => [(String, a)] -> a -> String
-nameIn table x = head [name | (name, y) <- table, x == y]
+nameIn :: Eq a => [(Text, a)] -> a -> String
+nameIn table x = head [Text.unpack name | (name, y) <- table, x == y]
 
 -- | Why a line is no event.
 --
@@ -159,36 +161,43 @@ data NoEvent
 --
 -- @since 0.1.0.0
 decodeEvent :: Bytes.ByteString -> Either NoEvent Event
-decodeEvent content
+decodeEvent = fmap fst . decodeSharing noTexts
+
+-- | The same, given the texts of the lines before, and with those for the lines after it. Equal texts are in memory once.
+--
+-- @since 0.1.0.0
+decodeSharing :: Texts -> Bytes.ByteString -> Either NoEvent (Event, Texts)
+decodeSharing known content
   | nestsDeeperThan 100 content = Left (NotAnEvent "it nests deeper than 100; allowed: an event, which nests 6 deep")
   | otherwise =
-      either (Left . NotJson) Right (eitherDecode content) >>= either (Left . NotAnEvent) Right . parseEither event
+      either (Left . NotJson) Right (eitherDecode content)
+        >>= either (Left . NotAnEvent) Right . parseEither (runSharing known . event)
 
-event :: Value -> Parser Event
-event = withObject "an event" $ \o ->
+event :: Value -> Sharing Event
+event = object "an event" $ \o ->
   choose o "event"
     [ ("began", Began <$> spanOf o)
-    , ("ended", Ended <$> spanOf o <*> (o .: "ended" >>= secondsOf) <*> (o .: "end" >>= endOf))
+    , ("ended", Ended <$> spanOf o <*> timeAt o "ended" <*> (valueAt o "end" >>= endOf))
     , ("reacted", Reacted <$> reactionOf o)
-    , ("lost", Lost <$> (o .: "count" >>= from1 "count"))
+    , ("lost", Lost <$> parsed (o .: "count" >>= from1 "count"))
     ]
 
-spanOf :: Object -> Parser Span
+spanOf :: Object -> Sharing Span
 spanOf o =
-  uncurry Span <$> numbered o
+  uncurry Span <$> parsed (numbered o)
     <*> choose o "kind" [(name, pure kind) | (name, kind) <- kinds]
-    <*> o .: "name"
-    <*> (o .: "began" >>= secondsOf)
-    <*> o .:? "reaction"
+    <*> textAt o "name"
+    <*> timeAt o "began"
+    <*> parsed (o .:? "reaction")
 
-reactionOf :: Object -> Parser Reaction
+reactionOf :: Object -> Sharing Reaction
 reactionOf o =
-  uncurry Reaction <$> numbered o
-    <*> o .: "operator"
-    <*> (o .: "time" >>= secondsOf)
-    <*> (o .: "changes" >>= traverse changeOf)
-    <*> (o .:? "stopped" >>= traverse stoppedOf)
-    <*> o .:? "starts"
+  uncurry Reaction <$> parsed (numbered o)
+    <*> textAt o "operator"
+    <*> timeAt o "time"
+    <*> changesAt o
+    <*> (parsed (o .:? "stopped") >>= traverse stoppedOf)
+    <*> perhapsTextAt o "starts"
 
 -- What something is in began before it. So nothing is in itself.
 numbered :: Object -> Parser (Int, Parent)
@@ -211,36 +220,34 @@ parentOf = \case
   number'@(Number _) -> Inside <$> parseJSON number'
   _ -> fail "parent: allowed: a number, \"top\", \"unknown\""
 
-endOf :: Value -> Parser End
-endOf = withObject "an end" $ \o ->
+endOf :: Value -> Sharing End
+endOf = object "an end" $ \o ->
   choose o "how"
     [ ("succeeded", pure Succeeded)
-    , ("failed", FailedWith <$> o .: "text")
-    , ("faulted", FaultedWith <$> o .: "text")
-    , ("stopped", StoppedBy <$> (o .: "cause" >>= causeOf))
+    , ("failed", FailedWith <$> textAt o "text")
+    , ("faulted", FaultedWith <$> textAt o "text")
+    , ("stopped", StoppedBy <$> (valueAt o "cause" >>= causeOf))
     ]
 
-causeOf :: Value -> Parser Cause
-causeOf = withObject "a cause" $ \o ->
+causeOf :: Value -> Sharing Cause
+causeOf = object "a cause" $ \o ->
   choose o "why"
-    [ ("signal", SignalChanged <$> o .: "reaction" <*> (o .: "changes" >>= traverse changeOf))
-    , ("sibling finished", SiblingFinished <$> o .: "branch")
-    , ("sibling failed", SiblingFailed <$> o .: "branch")
-    , ("time limit", TimeLimit <$> (o .: "limit" >>= secondsOf))
-    , ("from outside", FromOutside <$> o .: "exception")
+    [ ("signal", SignalChanged <$> parsed (o .: "reaction") <*> changesAt o)
+    , ("sibling finished", SiblingFinished <$> textAt o "branch")
+    , ("sibling failed", SiblingFailed <$> textAt o "branch")
+    , ("time limit", TimeLimit <$> timeAt o "limit")
+    , ("from outside", FromOutside <$> textAt o "exception")
     , ("abandoned", pure WasAbandoned)
     ]
 
-changeOf :: Value -> Parser Change
-changeOf = withObject "a change" $ \o -> Change <$> o .: "signal" <*> o .:? "before" <*> o .: "after"
+changesAt :: Object -> Sharing [Change]
+changesAt o = parsed (o .: "changes") >>= traverse changeOf
+ where
+  changeOf = object "a change" $ \c -> Change <$> textAt c "signal" <*> perhapsTextAt c "before" <*> textAt c "after"
 
-stoppedOf :: Value -> Parser StoppedBranch
-stoppedOf = withObject "a stopped branch" $ \o ->
-  StoppedBranch
-    <$> o .: "name"
-    <*> (o .: "after" >>= secondsOf)
-    <*> (o .: "took" >>= secondsOf)
-    <*> (o .: "end" >>= endOf)
+stoppedOf :: Value -> Sharing StoppedBranch
+stoppedOf = object "a stopped branch" $ \o ->
+  StoppedBranch <$> textAt o "name" <*> timeAt o "after" <*> timeAt o "took" <*> (valueAt o "end" >>= endOf)
 
 secondsOf :: Value -> Parser Seconds
 secondsOf = \case
@@ -250,10 +257,32 @@ secondsOf = \case
   number'@(Number _) -> Seconds <$> parseJSON number'
   _ -> fail "a time: allowed: a number, \"inf\", \"-inf\", \"nan\""
 
+object :: String -> (Object -> Sharing a) -> Value -> Sharing a
+object what fields value = parsed (withObject what pure value) >>= fields
+
+valueAt :: Object -> Key -> Sharing Value
+valueAt o key = parsed (o .: key)
+
+timeAt :: Object -> Key -> Sharing Seconds
+timeAt o key = parsed (o .: key >>= secondsOf)
+
+textAt :: Object -> Key -> Sharing String
+textAt o key = parsed (explicitParseField aText o key) >>= shared
+
+perhapsTextAt :: Object -> Key -> Sharing (Maybe String)
+perhapsTextAt o key = parsed (explicitParseFieldMaybe aText o key) >>= traverse shared
+
+aText :: Value -> Parser Text
+aText = \case
+  String known -> pure known
+  other -> typeMismatch "String" other
+
 -- The field's text selects how the rest is read.
-choose :: Object -> Key -> [(String, Parser a)] -> Parser a
+choose :: Object -> Key -> [(Text, Sharing a)] -> Sharing a
 choose o key table =
-  o .: key >>= withText (show key) (\name -> fromMaybe (refuse (Text.unpack name)) (lookup (Text.unpack name) table))
+  parsed (o .: key >>= withText (show key) pure) >>= \name -> fromMaybe (parsed (refuse name)) (lookup name table)
  where
   refuse name =
-    fail (show key ++ " is " ++ show (inertUpTo 60 name) ++ "; allowed: " ++ intercalate ", " (map fst table))
+    fail
+      (show key ++ " is " ++ show (inertUpTo 60 (Text.unpack name)) ++ "; allowed: "
+        ++ Text.unpack (Text.intercalate ", " (map fst table)))
