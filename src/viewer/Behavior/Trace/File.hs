@@ -43,9 +43,10 @@ import System.IO.Error (ioeSetFileName, modifyIOError)
 
 import Behavior.Time (Seconds, now)
 import Behavior.Trace
+import Behavior.Trace.Decode (decodeSharing)
 import Behavior.Trace.Describe (inertUpTo)
 import Behavior.Trace.Format
-import Behavior.Trace.Sharing
+import Behavior.Trace.Sharing (Texts, noTexts)
 
 -- $setup
 -- >>> import Behavior.Trace

@@ -116,12 +116,13 @@ mostOf :: Recording -> [Taken]
 mostOf r = level [] (recordingRoots r)
  where
   level itself ns
-    | [Taken _ t same] <- filter dominates (byName r ns) =
+    | [Taken _ t same] <- filter dominates known =
         level [Taken unnamed (t - covered r (inner same)) []] (inner same)
     | sumOf here < total / 2, not (null (inner ns)), sumOf deeper > sumOf here = deeper
     | otherwise = here
    where
-    here = mostFirst (filter (\(Taken _ t _) -> t > 0) (itself ++ byName r ns))
+    known = byName r ns
+    here = mostFirst (filter (\(Taken _ t _) -> t > 0) (itself ++ known))
     deeper = level [] (inner ns)
   dominates (Taken _ t same) = t >= 0.9 * total && total > 0 && not (null (inner same))
   inner = concatMap nodeChildren
