@@ -44,14 +44,14 @@ library = do
     prop "can do all that the relation allows, for small random programs" allThatIsAllowed
   sampling 500 $
     prop "does only what the relation allows when timers are late" $
-      onlyWhatIsAllowedOf 10 (slipping (worlds 3))
+      onlyWhatIsAllowedOf 10 (slipping (worlds (const True) 3))
   sampling 30 $
     prop "can do all that the relation allows when timers are late" $
       allThatIsAllowedOf (slipping smallWorlds)
 
 -- | A random program, under a random schedule.
 onlyWhatIsAllowed :: Property
-onlyWhatIsAllowed = onlyWhatIsAllowedOf 60 (worlds 4)
+onlyWhatIsAllowed = onlyWhatIsAllowedOf 60 (worlds (const True) 4)
 
 -- | For these worlds, of which at least the given percentage nest four deep.
 onlyWhatIsAllowedOf :: Double -> Gen World -> Property
@@ -286,6 +286,15 @@ relation = do
       Attempt 0 (act "a" 1 (Succeeds 7)) `endsIn` [Gave 0 (FailedWith noAlternative)]
       FallbackOver [] `endsIn` [Gave 0 (FailedWith noAlternative)]
 
+    it "retry after each delay, and throw the last failure" $ do
+      Retrying [2, 0] (Do "a" [script 1 Fails, script 1 Fails, script 1 (Succeeds 7)])
+        `endsIn` [Gave 5 (Succeeded (Number 7))]
+      Retrying [2] (act "a" 1 Fails) `endsIn` [Gave 4 (FailedWith "a")]
+      Retrying [2] (act "a" 1 Faults) `endsIn` [Gave 1 (FaultedWith "a")]
+    it "begin every run in a slot of its own, and skip the slots that a slow one has missed" $
+      Every 2 (Do "a" [script 1 (Succeeds 0), script 3 (Succeeds 0), script 1 Fails])
+        `endsIn` [Gave 7 (FailedWith "a")]
+
   describe "Concurrent operators" $ do
     it "end with the first branch to finish" $
       Parallel (act "a" 1 (Succeeds 0)) (act "b" 2 Faults) `endsIn` [Gave 1 (Succeeded Unit)]
@@ -344,6 +353,31 @@ relation = do
     it "waits for a branch that is masked uninterruptibly" $
       Timeout 1 (Do "a" [(script 4 (Succeeds 7)) {masking = Uninterruptible}] `Then` act "b" 1 (Succeeds 0))
         `endsIn` [Gave 4 (FailedWith (timedOut 1))]
+    it "is given up after a time by abandoning, whose behaviour goes on" $ do
+      let slow = Do "a" [(script 9 (Succeeds 7)) {onStop = EndsAfter 3 (Succeeds 8)}]
+          left n = Timeout 1 (Abandoning n slow) `Else` act "b" 5 (Succeeds 7)
+      with [] (left 2)
+        `hasTimeline` [ (0, Action "a" Begins)
+                      , (1, Action "a" ReceivesStop)
+                      , (3, Action "b" Begins)
+                      , (4, Action "a" (Ends (Succeeds 8)))
+                      , (8, Action "b" (Ends (Succeeds 7)))
+                      ]
+      with [] (left 4)
+        `hasTimeline` [ (0, Action "a" Begins)
+                      , (1, Action "a" ReceivesStop)
+                      , (4, Action "a" (Ends (Succeeds 8)))
+                      , (4, Action "b" Begins)
+                      , (9, Action "b" (Ends (Succeeds 7)))
+                      ]
+    it "loses the fault of a behaviour that was abandoned, and no other" $ do
+      let faulty = stoppedBy (EndsAfter 2 Faults) "a"
+      Timeout 1 (Abandoning 1 faulty) `endsIn` [Gave 2 (FailedWith (timedOut 1))]
+      Timeout 1 (Abandoning 3 faulty) `endsIn` [Gave 3 (FaultedWith (cleanupOf "a"))]
+    it "interrupts no cleanupWithin, whose own limit ends it" $ do
+      Timeout 1 (CleanupWithin 3 (stoppedBy StopsAtOnce "a") `Then` act "b" 9 (Succeeds 1))
+        `endsIn` [Gave 3 (FailedWith (timedOut 1))]
+      CleanupWithin 3 (act "a" 2 Fails) `endsIn` [Gave 2 (FailedWith "a")]
 
     it "throws the fault of a cleanup together with another thread's cancellation" $ do
       cancelledTwice (Parallel (stoppedBy StopsAtOnce "a") (stoppedBy (EndsAfter 3 Faults) "b"))

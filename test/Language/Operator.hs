@@ -15,6 +15,7 @@ module Language.Operator
   , traverseBoth
   , operatorName
   , forks
+  , abandons
 
     -- * Random operators
   , Around (..)
@@ -42,7 +43,7 @@ module Language.Operator
 
 import Control.Exception (ErrorCall (..), throwIO)
 import Control.Monad (void)
-import Data.Maybe (catMaybes, isNothing)
+import Data.Maybe (catMaybes, fromMaybe, isNothing)
 import Test.QuickCheck (Gen, choose, frequency, suchThat, vectorOf)
 
 import Behavior
@@ -50,7 +51,7 @@ import Behavior.Parallel (Child, allOf, await, decide, firstOf, fork, requestSto
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior.Time (abandoning, cleanupWithin, every, retrying, timeout)
 
 -- | A time, or a duration.
 type Ticks = Int
@@ -63,6 +64,8 @@ data Operator s p
     p `Else` p
   | Attempt Int p
   | FallbackOver [p]
+  | Retrying [Ticks] p
+  | Every Ticks p
   | Parallel p p
   | Both p p
   | FirstOf [p]
@@ -79,6 +82,9 @@ data Operator s p
   | WaitUntil s
   | WhileHolding s p
   | Timeout Ticks p
+  | CleanupWithin Ticks p
+  | -- | The part may go on when the operator has ended; so it uses no scope and no shared signal around it.
+    Abandoning Ticks p
   | -- | The part may follow the signal, as the shared one.
     WithShared s p
   | Scoped p
@@ -107,6 +113,8 @@ traverseBoth signal part = \case
   Else a b -> Else <$> part a <*> part b
   Attempt n a -> Attempt n <$> part a
   FallbackOver as -> FallbackOver <$> traverse part as
+  Retrying delays a -> Retrying delays <$> part a
+  Every n a -> Every n <$> part a
   Parallel a b -> Parallel <$> part a <*> part b
   Both a b -> Both <$> part a <*> part b
   FirstOf as -> FirstOf <$> traverse part as
@@ -120,6 +128,8 @@ traverseBoth signal part = \case
   WaitUntil s -> WaitUntil <$> signal s
   WhileHolding s a -> WhileHolding <$> signal s <*> part a
   Timeout n a -> Timeout n <$> part a
+  CleanupWithin n a -> CleanupWithin n <$> part a
+  Abandoning n a -> Abandoning n <$> part a
   WithShared s a -> WithShared <$> signal s <*> part a
   Scoped a -> Scoped <$> part a
   Fork a -> Fork <$> part a
@@ -142,6 +152,8 @@ operatorName = \case
   WaitUntil _ -> Just "waitUntil"
   WhileHolding _ _ -> Just "whileHolding"
   Timeout _ _ -> Just "timeout"
+  CleanupWithin _ _ -> Just "cleanupWithin"
+  Abandoning _ _ -> Just "abandoning"
   WithShared _ _ -> Just "withShared"
   Scoped _ -> Just "scoped"
   _ -> Nothing
@@ -152,6 +164,12 @@ forks = \case
   Fork _ -> True
   Await _ _ -> True
   StopChild _ _ -> True
+  _ -> False
+
+-- | Whether what it runs may go on when it has ended.
+abandons :: Operator s p -> Bool
+abandons = \case
+  Abandoning _ _ -> True
   _ -> False
 
 -- * Random operators
@@ -174,6 +192,7 @@ aroundPartsOf :: Operator s p -> Around -> Around
 aroundPartsOf o around = case o of
   WithShared _ _ -> Around {inScope = False, sharing = True}
   Scoped _ -> around {inScope = True}
+  Abandoning _ _ -> outside
   _ -> around
 
 -- | An operator of the wanted kind, which may stand there, with signals and parts from the generators.
@@ -189,6 +208,8 @@ shapes around =
     , (3, pure (Else () ()))
     , (1, (`Attempt` ()) <$> choose (0, 3))
     , (1, FallbackOver <$> oftenSeveral (pure ()))
+    , (2, (`Retrying` ()) <$> (choose (0, 2) >>= \k -> vectorOf k (choose (0, 3))))
+    , (1, (`Every` ()) <$> choose (1, 4))
     , (2, pure (Parallel () ()))
     , (2, pure (Both () ()))
     , (2, FirstOf <$> oftenSeveral (pure ()))
@@ -202,6 +223,8 @@ shapes around =
     , (1, pure (WaitUntil ()))
     , (2, pure (WhileHolding () ()))
     , (2, (`Timeout` ()) <$> frequency [(1, pure 0), (9, choose (1, 6))])
+    , (1, (`CleanupWithin` ()) <$> choose (0, 4))
+    , (2, (`Abandoning` ()) <$> choose (0, 3))
     , (2, pure (WithShared () ()))
     , (2, pure (Scoped ()))
     ]
@@ -235,6 +258,7 @@ shrinkOperator signal part o = fewer ++ others
   fewer = case o of
     Attempt n a -> [Attempt (n - 1) a | n > 1]
     FallbackOver as -> FallbackOver <$> without as
+    Retrying delays a -> (`Retrying` a) <$> without delays
     FirstOf as -> FirstOf <$> without as
     AllOf as -> AllOf <$> without as
     Decide choice as b -> (\some -> Decide choice some b) <$> without as
@@ -295,6 +319,8 @@ run language around outer own o = case o of
   Else a b -> inPlace a ? inPlace b
   Attempt n a -> attempt n (inPlace a)
   FallbackOver as -> fallbackOver as inPlace
+  Retrying delays a -> retrying (map ticks delays) (inPlace a)
+  Every n a -> every (ticks n) (inPlace a)
   Parallel a b -> none <$ parallel (branch "left" a) (branch "right" b)
   Both a b -> none <$ both (branch "left" a) (branch "right" b)
   FirstOf as -> firstOf (each as)
@@ -308,7 +334,9 @@ run language around outer own o = case o of
     Signal.teleoReactive [(condition s, branch ("rule " ++ show n) a) | (n, (s, a)) <- zip [1 :: Int ..] rules]
   WaitUntil s -> none <$ Signal.waitUntil (condition s)
   WhileHolding s a -> Signal.whileHolding (condition s) (branch "branch" a)
-  Timeout n a -> timeout (fromIntegral n * tick language) (branch "branch" a)
+  Timeout n a -> timeout (ticks n) (branch "branch" a)
+  CleanupWithin n a -> fromMaybe none <$> cleanupWithin (ticks n) (branch "branch" a)
+  Abandoning n a -> abandoning (ticks n) (branch "branch" a)
   WithShared s a -> Signal.withShared (level s) (\signal -> branchIn around {nearest = signal} "body" a)
   Scoped a -> scoped $ \nursery ->
     branchIn around {forking = \forked -> fork nursery (forked (labelled "fork"))} "body" a
@@ -326,6 +354,7 @@ run language around outer own o = case o of
   condition s = holds <$> level s
   several = results language . Just
   none = results language Nothing
+  ticks n = fromIntegral n * tick language
 
 -- | A number as a condition.
 holds :: Int -> Bool

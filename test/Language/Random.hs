@@ -23,7 +23,7 @@ programs wanted = go O.outside
   go :: Around -> Int -> Gen Program
   go around 0 =
     frequency $
-      [(30, action), (1, Pure . Number <$> choose (0, 2))]
+      [(30, action), (1, Pure . Number <$> choose (0, 2)), (1, Sleep <$> choose (0, 3))]
         ++ [(1, WaitUntil <$> signal around 0) | wanted (O.WaitUntil ())]
         ++ [(14, Op <$> O.operators O.forks around (const (pure Shared)) (const action)) | inScope around]
   go around n =
@@ -83,6 +83,7 @@ shrinkProgram p = filter isWellFormed (parts p ++ smaller p)
   smaller = \case
     Do name scripts -> [Do name some | some <- shrinkList shrinkScript scripts, not (null some)]
     Pure Unit -> []
+    Sleep n -> Pure Unit : [Sleep (n - 1) | n > 0]
     Pure _ -> [Pure Unit]
     Op o -> Op <$> O.shrinkOperator shrinkSignal (\q -> parts q ++ smaller q) o
   shrinkSignal s = case s of
@@ -111,8 +112,8 @@ withNames = O.numbered . go
  where
   go = \case
     Do _ scripts -> Numbered (\n -> (n + 1, Do ('a' : show n) scripts))
-    Pure value -> pure (Pure value)
     Op o -> Op <$> O.traverseBoth (traverse go) go o
+    p -> pure p
 
 -- | Whether each fork is in a scope, and each shared signal where there is one; and whether each recovery takes
 -- time: otherwise it would repeat for ever while the condition holds.

@@ -16,7 +16,7 @@ module Language.Script
       ( ..
       , Then, Else, Attempt, FallbackOver, Parallel, Both, FirstOf, AllOf
       , Decide, RSelect, Monitor, InsteadWhen, Switch, TeleoReactive, WaitUntil, WhileHolding
-      , Timeout, WithShared, Scoped, Fork, Await, StopChild
+      , Timeout, CleanupWithin, Abandoning, Retrying, Every, WithShared, Scoped, Fork, Await, StopChild
       )
   , Signal
   , SignalOf (..)
@@ -61,6 +61,8 @@ data Program
     Do Name [Script]
   | -- | Returns the value.
     Pure Value
+  | -- | Takes time.
+    Sleep Ticks
   | Op (O.Operator Signal Program)
   deriving (Eq, Ord)
 
@@ -68,6 +70,7 @@ data Program
 instance Show Program where
   showsPrec d = \case
     Do name scripts -> showParen (d > 10) $ showString "Do " . showsPrec 11 name . showString " " . showsPrec 11 scripts
+    Sleep n -> showParen (d > 10) $ showString "Sleep " . showsPrec 11 n
     Pure value -> showParen (d > 10) $ showString "Pure " . showsPrec 11 value
     Op o -> showsPrec d o
 
@@ -153,9 +156,15 @@ pattern Scoped, Fork :: Program -> Program
 pattern Scoped a = Op (O.Scoped a)
 pattern Fork a = Op (O.Fork a)
 
-pattern Attempt, Timeout :: Int -> Program -> Program
+pattern Attempt, Timeout, CleanupWithin, Abandoning, Every :: Int -> Program -> Program
 pattern Attempt a b = Op (O.Attempt a b)
 pattern Timeout a b = Op (O.Timeout a b)
+pattern CleanupWithin a b = Op (O.CleanupWithin a b)
+pattern Abandoning a b = Op (O.Abandoning a b)
+pattern Every a b = Op (O.Every a b)
+
+pattern Retrying :: [Ticks] -> Program -> Program
+pattern Retrying a b = Op (O.Retrying a b)
 
 pattern FallbackOver, FirstOf, AllOf :: [Program] -> Program
 pattern FallbackOver a = Op (O.FallbackOver a)
@@ -184,8 +193,9 @@ pattern WhileHolding a b = Op (O.WhileHolding a b)
 pattern WithShared a b = Op (O.WithShared a b)
 
 {-# COMPLETE
-  Do, Pure, Then, Else, Attempt, FallbackOver, Parallel, Both, FirstOf, AllOf, Decide, RSelect, Monitor, InsteadWhen
-  , Switch, TeleoReactive, WaitUntil, WhileHolding, Timeout, WithShared, Scoped, Fork, Await, StopChild
+  Do, Pure, Sleep, Then, Else, Attempt, FallbackOver, Retrying, Every, Parallel, Both, FirstOf, AllOf, Decide, RSelect
+  , Monitor, InsteadWhen, Switch, TeleoReactive, WaitUntil, WhileHolding, Timeout, CleanupWithin, Abandoning
+  , WithShared, Scoped, Fork, Await, StopChild
   #-}
 
 -- * The parts of a program

@@ -9,6 +9,8 @@ module Semantics.Begin
   , opened
   , andThen
   , orElse
+  , continued
+  , inSlot
   , ended
   , thread
   ) where
@@ -45,6 +47,7 @@ initial world =
       , shared = []
       , childResults = Map.empty
       , childStopRequests = Set.empty
+      , abandoned = []
       }
 
 -- | The state of a program that is about to run.
@@ -52,6 +55,7 @@ begin :: Now -> Program -> Running
 begin t p = case p of
   Do name scripts -> Calling name scripts
   Pure value -> Over (Succeeded value)
+  Sleep n -> if n > 0 then Sleeping (clock t + n) else Over (Succeeded Unit)
   Then first second -> andThen t (begin t first) second
   Else first second -> orElse t (begin t first) second
   Attempt n act
@@ -61,6 +65,9 @@ begin t p = case p of
   FallbackOver [] -> Over (FailedWith noAlternative)
   FallbackOver [act] -> begin t act
   FallbackOver (act : acts) -> begin t (act `Else` FallbackOver acts)
+  Retrying [] act -> begin t act
+  Retrying (wait : later) act -> begin t (act `Else` (Sleep wait `Then` Retrying later act))
+  Every interval act -> inSlot interval (clock t) act (begin t act)
   Parallel left right -> Waiting Race [thread t "parallel: left" (void left), thread t "parallel: right" (void right)]
   Both left right -> Waiting Gather [thread t "both: left" left, thread t "both: right" right] `AndThen` Pure Unit
   FirstOf [] -> Over (FailedWith noAlternative)
@@ -74,11 +81,14 @@ begin t p = case p of
   Fork act -> Forking act Nothing
   Await act meanwhile -> Forking act (Just (False, meanwhile))
   StopChild act meanwhile -> Forking act (Just (True, meanwhile))
-  Timeout most _ -> Reacting p (Deadline (clock t + most)) Always (Choosing FirstRead)
+  Timeout most _ -> before most
+  CleanupWithin most _ -> Uninterruptibly (before most)
+  Abandoning most act -> Waiting (Abandon most) [thread t "abandoning: branch" act]
   _ | any usesShared (signals p) -> Opening p
     | otherwise -> opened t p
  where
   void act = act `Then` Pure Unit
+  before most = Reacting p (Deadline (clock t + most)) Always (Choosing FirstRead)
   numbered operator acts = [thread t (operator ++ show n) act | (n, act) <- zip [1 :: Int ..] acts]
 
 -- | An operator on signals, which opens its signal.
@@ -93,20 +103,27 @@ opened t p = case p of
   following source = Reacting p source (viewOf t source) (Choosing FirstRead)
 
 andThen, orElse :: Now -> Running -> Program -> Running
-andThen t (Over (Succeeded _)) second = next t second
+andThen t (Over (Succeeded _)) second = continued t second
 andThen _ (Over other) _ = Over other
 andThen _ first second = first `AndThen` second
-orElse t (Over (FailedWith _)) second = next t second
+orElse t (Over (FailedWith _)) second = continued t second
 orElse _ (Over other) _ = Over other
 orElse _ first second = first `OrElse` second
 
 -- | What runs after something else. If it fails at once, that is after the first has ended: there a request is
 -- received that the first did not receive. (And one that comes only then, as in reality; the simulator has no
 -- scheduling point there.)
-next :: Now -> Program -> Running
-next t second = case begin t second of
+continued :: Now -> Program -> Running
+continued t second = case begin t second of
   Over (FailedWith _) -> Starting second
   begun -> begun
+
+-- | The run of a program that runs again in each slot: when it has succeeded, the next slot is awaited.
+inSlot :: Ticks -> Ticks -> Program -> Running -> Running
+inSlot interval from act = \case
+  Over (Succeeded _) -> AwaitingSlot interval (from + interval) act
+  Over wrong -> Over wrong
+  r -> InSlot interval from act r
 
 ended :: Name -> Ending -> Result
 ended name = \case

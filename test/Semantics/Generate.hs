@@ -12,14 +12,16 @@ module Semantics.Generate
 import Data.List (sortOn)
 import Test.QuickCheck
 
+import Language.Operator (Operator)
 import Language.Random
-import Semantics.Program
+import Semantics.Program hiding (Operator)
+import qualified Semantics.Program as Program
 
--- | Worlds with programs up to the given depth.
-worlds :: Int -> Gen World
-worlds deep = do
+-- | Worlds with programs up to the given depth, made of operators of the wanted kind.
+worlds :: (Operator () () -> Bool) -> Int -> Gen World
+worlds wanted deep = do
   first <- traverse (\c -> (,) c <$> frequency [(14, At <$> choose (0, 1)), (1, pure NoValue)]) known
-  World first <$> someChanges <*> choose (4, 16) <*> someProgram deep <*> callers <*> pure 0
+  World first <$> someChanges <*> choose (4, 16) <*> someProgram wanted deep <*> callers <*> pure 0
  where
   someChanges = do
     n <- choose (0, 8)
@@ -32,15 +34,15 @@ smallWorlds = do
   first <- At <$> choose (0, 1)
   n <- choose (0, 2)
   later <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
-  World [("p", first), ("q", At 0)] later <$> choose (2, 4) <*> someProgram 1 <*> callers <*> pure 0
+  World [("p", first), ("q", At 0)] later <$> choose (2, 4) <*> someProgram (const True) 1 <*> callers <*> pure 0
  where
   someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure NoValue)]
 
-someProgram :: Int -> Gen Program
-someProgram deep = withNames <$> programs (const True) deep
+someProgram :: (Operator () () -> Bool) -> Int -> Gen Program
+someProgram wanted deep = withNames <$> programs wanted deep
 
 callers :: Gen Caller
-callers = frequency [(3, pure Operator), (1, PlainThread <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))]
+callers = frequency [(3, pure Program.Operator), (1, PlainThread <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))]
 
 inOrder :: [Change] -> [Change]
 inOrder = sortOn (\(Change at _ _) -> at)
@@ -53,7 +55,7 @@ shrinkWorld :: World -> [World]
 shrinkWorld world =
   [world {program = p} | p <- shrinkProgram (program world)]
     ++ [world {changes = some} | some <- shrinkList shrinkChange (changes world)]
-    ++ [world {caller = Operator} | caller world /= Operator]
+    ++ [world {caller = Program.Operator} | caller world /= Program.Operator]
     ++ [world {slippage = n} | n <- shrink (slippage world)]
     ++ [world {cancelAt = n} | n <- shrink (cancelAt world), n > 0]
  where

@@ -141,8 +141,8 @@ observing instrument simulated world = do
       | isBranch (stepLabel s) -> (ticks (stepTime s), IsOver (show (stepLabel s))) : recorded others transitions
     _ -> recorded others transitions
   recorded [] _ = []
-  isBranch (Label _ name) =
-    name `notElem` ["", "polling", "clock", "staleAfter", "debounce", "debounce clock", "throttle", "hysteresis"]
+  isBranch (Label _ name) = name `notElem` ["", "polling", "clock", "watcher"] && name `notElem` filters
+  filters = ["staleAfter", "debounce", "debounce clock", "throttle", "hysteresis"]
 
 -- | What a program runs with: the conditions, and the number of calls of each action.
 data Context = Context
@@ -198,6 +198,7 @@ language instrument emit context = this
         let n = Map.findWithDefault 0 name counts in (Map.insert name (n + 1) counts, n)
       perform (acting outer) name (scripts !! min n (length scripts - 1))
     Pure value -> pure value
+    Sleep n -> Unit <$ sleep (fromIntegral n)
     Op o -> run this around outer own o
   acting here =
     Acting

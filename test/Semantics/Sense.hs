@@ -70,7 +70,7 @@ pollerSteps
   -> Steps Poller
 pollerSteps steps receive t s =
     case poll s of
-      Sleeping due
+      BetweenSlots due
         | clock t >= due ->
             silently t $
               read'
@@ -78,7 +78,8 @@ pollerSteps steps receive t s =
                 (begin t (sensor s))
       Reading r -> [(l, t', read' s r') | (l, t', r') <- steps t r]
       Unpublished result ->
-        silently t s {newest = Just (readings s, result), inFlightSince = Nothing, poll = Sleeping (nextSlot (slot s))}
+        silently t $
+          s {newest = Just (readings s, result), inFlightSince = Nothing, poll = BetweenSlots (nextSlot (slot s))}
       EndingWith result -> silently t s {poll = PollEnded (asOutcome result)}
       _ -> []
       ++ [(Emits transition, t, s') | pollerRequest s == Requested, (transition, s') <- receives]

@@ -85,7 +85,7 @@ startSource t = \case
         { newest = Nothing
         , inFlightSince = Nothing
         , pollerRequest = NoRequest
-        , poll = Sleeping (max (clock t) (slot s))
+        , poll = BetweenSlots (max (clock t) (slot s))
         }
   Joined how sources -> Joined how (map (startSource t) sources)
   WithHysteresis m source -> WithHysteresis m {hysteresisWorker = workerFor inner} inner

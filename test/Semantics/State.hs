@@ -33,6 +33,7 @@ module Semantics.State
     -- * Time
   , dueTimes
   , afterTimePassed
+  , threadAfter
   ) where
 
 import Data.Map.Strict (Map)
@@ -63,6 +64,8 @@ data Now = Now
   , childStopRequests :: Set Int
   -- ^ The children whose stop was requested by their handle, and not yet passed on by their
   -- nursery.
+  , abandoned :: [Thread]
+  -- ^ Those that have not ended.
   }
   deriving (Eq, Ord, Show)
 
@@ -102,6 +105,15 @@ data Running
     AwaitingChild Int Running
   | -- | The child with that number, whose result is awaited.
     AsChild Int Running
+  | -- | Until the given time.
+    Sleeping Ticks
+  | -- | The run of a program that runs again in each slot: the interval, and the slot of this run.
+    InSlot Ticks Ticks Program Running
+  | -- | Until that slot.
+    AwaitingSlot Ticks Ticks Program
+  | Uninterruptibly Running
+  | -- | A thread whose stop was requested, which is awaited until the given time, and then abandoned.
+    GivingUp Ticks Thread
   | -- | The environment, with the changes to come and the time at which it ends.
     Changing [Change] Ticks
   | -- | A program that a plain thread runs, with the changes to come and the times at which
@@ -117,6 +129,8 @@ data Operator
   | Gather
   | Choose Choice
   | Nursery
+  | -- | For how long the branch is awaited when its stop was requested.
+    Abandon Ticks
   | Share
   | React
   deriving (Eq, Ord, Show)
@@ -196,7 +210,7 @@ data Poller = Poller
   deriving (Eq, Ord, Show)
 
 data Poll
-  = Sleeping Ticks
+  = BetweenSlots Ticks
   | Reading Running
   | -- | The reading has ended, and is not yet published.
     Unpublished Result
@@ -252,6 +266,11 @@ dueTimes = \case
   CleaningInterruptibly _ due -> [due]
   first `AndThen` _ -> dueTimes first
   first `OrElse` _ -> dueTimes first
+  Sleeping due -> [due]
+  InSlot _ _ _ r -> dueTimes r
+  AwaitingSlot _ due _ -> [due]
+  Uninterruptibly r -> dueTimes r
+  GivingUp due branch -> due : ofThreads [branch]
   StoppingChild _ r -> dueTimes r
   AwaitingChild _ r -> dueTimes r
   AsChild _ r -> dueTimes r
@@ -268,7 +287,7 @@ dueTimes = \case
   ofThreads threads = concat [dueTimes r | Thread _ (Live _ r) <- threads]
   ofSource = \case
     Deadline end -> [end]
-    Polling Poller {poll = Sleeping due} -> [due]
+    Polling Poller {poll = BetweenSlots due} -> [due]
     Polling Poller {poll = Reading r} -> dueTimes r
     Joined _ sources -> concatMap ofSource sources
     WithHysteresis _ source -> ofSource source
@@ -283,22 +302,23 @@ afterTimePassed :: Running -> Running
 afterTimePassed = \case
   first `AndThen` second -> afterTimePassed first `AndThen` second
   first `OrElse` second -> afterTimePassed first `OrElse` second
+  InSlot interval from p r -> InSlot interval from p (afterTimePassed r)
+  Uninterruptibly r -> Uninterruptibly (afterTimePassed r)
+  GivingUp due branch -> GivingUp due (threadAfter branch)
+  StoppingChild k r -> StoppingChild k (afterTimePassed r)
   AwaitingChild k r -> AwaitingChild k (afterTimePassed r)
   AsChild k r -> AsChild k (afterTimePassed r)
-  Waiting operator threads -> Waiting operator (map ofThread threads)
+  Waiting operator threads -> Waiting operator (map threadAfter threads)
   Reacting p source v phase -> Reacting p (ofSource source) v (ofPhase phase)
-  Sharing source body -> Sharing (ofSource source) (ofThread body)
-  Concluding operator result source threads -> Concluding operator result (ofSource source) (map ofThread threads)
-  Called requests r coming stopTimes -> Called (ofRequest requests) (afterTimePassed r) coming stopTimes
+  Sharing source body -> Sharing (ofSource source) (threadAfter body)
+  Concluding operator result source threads -> Concluding operator result (ofSource source) (map threadAfter threads)
+  Called requests r coming stopTimes -> Called (requestAfter requests) (afterTimePassed r) coming stopTimes
   r -> r
  where
-  ofThread = \case
-    Thread label (Live requests r) -> Thread label (Live (ofRequest requests) (afterTimePassed r))
-    other -> other
   ofPhase = \case
-    Following value branch -> Following value (ofThread branch)
-    Stopping next branch -> Stopping next (ofThread branch)
-    Recovering before recovery -> Recovering (ofThread <$> before) (ofThread recovery)
+    Following value branch -> Following value (threadAfter branch)
+    Stopping next branch -> Stopping next (threadAfter branch)
+    Recovering before recovery -> Recovering (threadAfter <$> before) (threadAfter recovery)
     phase -> phase
   ofSource = \case
     Polling s@Poller {poll = Reading r} -> Polling s {poll = Reading (afterTimePassed r)}
@@ -308,9 +328,17 @@ afterTimePassed = \case
     Throttled h source -> Throttled h (ofSource source)
     WithWatchdog w source -> WithWatchdog w (ofSource source)
     source -> source
-  ofRequest = \case
-    NotStarted -> NoRequest
-    Requested -> Pending
-    RequestedTwice -> PendingTwice
-    PendingAndRequested -> PendingTwice
-    requests -> requests
+
+-- | The same for a thread, and for the stop requests of one.
+threadAfter :: Thread -> Thread
+threadAfter = \case
+  Thread label (Live requests r) -> Thread label (Live (requestAfter requests) (afterTimePassed r))
+  other -> other
+
+requestAfter :: Request -> Request
+requestAfter = \case
+  NotStarted -> NoRequest
+  Requested -> Pending
+  RequestedTwice -> PendingTwice
+  PendingAndRequested -> PendingTwice
+  requests -> requests

@@ -29,20 +29,29 @@ import Semantics.Verdict
 
 -- | The possible steps, each with its transition.
 step :: State -> [(Transition, State)]
-step (State r t) = [(transition, State r' t') | (Emits transition, t', r') <- steps t r]
+step (State r t) = case r of
+  Over _ -> []
+  _ ->
+    [(transition, State r' t') | (Emits transition, t', r') <- steps t r]
+      ++ [ (transition, State r t' {abandoned = abandoned t' ++ filter (not . over) threads})
+         | (Emits transition, t', threads) <- oneOf (threadSteps t {abandoned = []}) (abandoned t)
+         ]
 
 -- | Time passes, up to the next time at which something is due; or to a later one, as long
 -- as nothing gets late by the given number of ticks. Only for states in which no step is
 -- possible.
 pass :: Ticks -> State -> [State]
-pass slip (State r t) = case filter (> clock t) (dueTimes r) of
-  [] -> []
-  coming ->
-    [ State (afterTimePassed r) t {clock = at}
+pass slip (State r t) = case (r, filter (> clock t) (dueTimes r ++ concat ofAbandoned)) of
+  (Over _, _) -> []
+  (_, []) -> []
+  (_, coming) ->
+    [ State (afterTimePassed r) t {clock = at, abandoned = map threadAfter (abandoned t)}
     | let next = minimum coming
     , at <- Set.toList (Set.fromList coming)
     , at == next || at < next + slip
     ]
+ where
+  ofAbandoned = [dueTimes live | Thread _ (Live _ live) <- abandoned t]
 
 steps :: Now -> Running -> Steps Running
 steps t = \case
@@ -63,6 +72,22 @@ steps t = \case
   CleaningInterruptibly name due -> [(Emits (Action name Stops), t, Over (Stopped Nothing)) | clock t >= due]
   first `AndThen` second -> [(l, t', andThen t' r second) | (l, t', r) <- steps t first]
   first `OrElse` second -> [(l, t', orElse t' r second) | (l, t', r) <- steps t first]
+  Sleeping due -> [over' | clock t >= due, over' <- silently t (Over (Succeeded Unit))]
+  InSlot interval from p r -> [(l, t', inSlot interval from p r') | (l, t', r') <- steps t r]
+  AwaitingSlot interval due p
+    -- Slots that were missed are skipped.
+    | due < clock t -> silently t (AwaitingSlot interval (due + interval) p)
+    | otherwise -> [begun | clock t >= due, begun <- silently t (inSlot interval due p (continued t p))]
+  Uninterruptibly (Over result) -> silently t (Over result)
+  Uninterruptibly r -> [(l, t', Uninterruptibly r') | (l, t', r') <- steps t r]
+  GivingUp due branch
+    | over branch -> silently t (Over (outcome Race (Stopped Nothing) noSource [branch]))
+    | otherwise ->
+        [(l, t', GivingUp due branch') | (l, t', branch') <- threadSteps t branch]
+          ++ [ gone
+             | clock t >= due
+             , gone <- silently t {abandoned = abandoned t ++ [branch]} (Over (Stopped Nothing))
+             ]
   Waiting operator threads ->
     case verdict operator threads of
       Just result -> silently t (conclude operator result noSource threads)
@@ -238,6 +263,15 @@ receive t = \case
   StoppingChild k r -> within' (StoppingChild k) r
   AwaitingChild k r -> within' (AwaitingChild k) r
   AsChild k r -> fmap (AsChild k) <$> receive t r
+  Sleeping _ -> stopped
+  InSlot interval from p r -> fmap (inSlot interval from p) <$> receive t r
+  AwaitingSlot {} -> stopped
+  Uninterruptibly _ -> []
+  GivingUp _ _ -> []
+  Waiting (Abandon most) threads ->
+    [ (Silent, case some of [] -> Over (Stopped Nothing); branch : _ -> GivingUp (clock t + most) (requestStop branch))
+    | some <- started threads
+    ]
   Waiting operator threads -> [(Silent, conclude operator (Stopped Nothing) noSource some) | some <- started threads]
   Reacting _ source _ phase ->
     [(Silent, conclude React (Stopped Nothing) source some) | some <- started (threadsOf phase)]

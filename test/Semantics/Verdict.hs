@@ -30,6 +30,7 @@ verdict :: Operator -> [Thread] -> Maybe Result
 verdict operator threads = case operator of
   -- The first to finish; on a tie the left one.
   Race -> firstOf results
+  Abandon _ -> firstOf results
   Share -> firstOf results
   -- The first that does not complete; on a tie the left one.
   Gather
@@ -114,6 +115,7 @@ response p value = case p of
   TeleoReactive rules -> if value < 0 then Idle else Run (snd (rules !! value))
   WaitUntil _ -> if isTrue then Conclude (Succeeded Unit) else Idle
   WhileHolding _ act -> if isTrue then Run act else Conclude (FailedWith doesNotHold)
+  CleanupWithin _ act -> if isTrue then Conclude (Succeeded Unit) else Run act
   Timeout most act -> if isTrue then Conclude (FailedWith (timedOut most)) else Run act
   _ -> Idle
  where
@@ -128,6 +130,7 @@ nameOf p value = case p of
   Switch {} -> "switch: branch"
   TeleoReactive _ -> "teleoReactive: rule " ++ show (value + 1)
   WhileHolding {} -> "whileHolding: branch"
+  CleanupWithin {} -> "cleanupWithin: branch"
   _ -> "timeout: branch"
 
 -- | The name of the branch that runs to its end.

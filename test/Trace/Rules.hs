@@ -275,6 +275,13 @@ endings x =
     (StoppedBy _, PartStopped) -> True
     _ -> False
 
+-- | The limit of an operator that stops its branch when its time is up.
+timeLimit :: Program -> Maybe Program.Ticks
+timeLimit = \case
+  Timeout n _ -> Just n
+  CleanupWithin n _ -> Just n
+  _ -> Nothing
+
 isStopped :: End -> Bool
 isStopped = \case StoppedBy _ -> True; _ -> False
 
@@ -382,8 +389,8 @@ causes x =
           ("scoped", FromOutside "requestStop") -> name == "fork"
           ("withShared", SiblingFinished n) -> not (null (finishedNow n))
           ("withShared", SiblingFailed n) -> not (null (failedNow n))
-          ("timeout", TimeLimit limit) -> case itsProgram of
-            Just (Timeout n _) ->
+          (_, TimeLimit limit) -> case itsProgram >>= timeLimit of
+            Just n ->
               let isLate (_, _, _, t, _) = t >= realToFrac (spanBegan o) + fromIntegral n
                in limit == fromIntegral n && maybe False isLate (Map.lookup (spanNumber s) (over x))
             _ -> False
@@ -396,7 +403,7 @@ causes x =
                 -- Nothing begins after the failure of a sensor. (What had been started begins at the same time,
                 -- and may even end by itself.)
                 SiblingFailed "sensor"
-                  | op /= "timeout" && null begunLater ->
+                  | isNothing (itsProgram >>= timeLimit) && null begunLater ->
                       operatorEnd /= Just Succeeded || any (\(_, _, e) -> e == Succeeded) (siblings o)
                 SiblingFailed n -> not (null (failedNow n))
                 _ -> False
@@ -489,8 +496,7 @@ values x =
       -- (Equal changes are reported once.)
       TeleoReactive _ ->
         not (null levels) && (not (direct p) || and [holds (read was) /= holds (read now) | (Just was, now) <- levels])
-      Timeout _ _ -> null levels
-      _ -> False
+      _ -> isJust (timeLimit p) && null levels
   isTeleoReactive = \case TeleoReactive _ -> True; _ -> False
   direct p = not (any (`isInfixOf` show (Program.signals p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
   -- The numbers of the spans before and after say where in the record the operator decided.
