@@ -1,4 +1,4 @@
-.PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak \
+.PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak rules \
   signals reality attacks mutants release ci clean
 
 help:
@@ -21,6 +21,7 @@ help:
 	@echo 'make signals   SIGINT, SIGTERM, SIGHUP at 1,000 random moments each (MOMENTS=100 for fewer)'
 	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
 	@echo 'make attacks   programs that try to break the promises (NAMES="Storm" selects)'
+	@echo 'make rules     the rules of the specification that no random program reaches'
 	@echo 'make mutants   small mistakes in the sources, which the tests must detect (NAMES="debounce" selects)'
 	@echo 'make release   the archives of a release, tried in a clean folder (uploads nothing)'
 	@echo 'make clean     remove what was built'
@@ -47,6 +48,9 @@ bench:
 
 bench-check:
 	@.ci/bench check
+
+rules:
+	@.ci/rules
 
 soak:
 	@.ci/soak $(or $(SECONDS),300)

@@ -430,6 +430,30 @@ relation = do
         (act "r" 9 (Succeeds 3))
         `endsIn` [Gave 8 (Succeeded (Number 2))]
 
+  describe "Messages" $ do
+    it "stop the task, are handled one after the other, and then the task begins again" $
+      does
+        ( Both
+            (OnMessage (act "h" 2 (Succeeds 0)) (act "t" 3 (Succeeds 7)))
+            (act "a" 1 (Succeeds 0) `Then` Deliver `Then` Deliver)
+        )
+        ["t", "h"]
+        [ (0, Action "t" Begins)
+        , (1, Action "t" ReceivesStop)
+        , (1, Action "h" Begins)
+        , (3, Action "h" (Ends (Succeeds 0)))
+        , (3, Action "h" Begins)
+        , (5, Action "h" (Ends (Succeeds 0)))
+        , (5, Action "t" Begins)
+        , (8, Action "t" (Ends (Succeeds 7)))
+        ]
+    it "whose handler does not succeed are handled again" $
+      (Deliver `Then` (Timeout 1 (HandleNext (act "h" 2 (Succeeds 7))) `Else` HandleNext (act "h" 2 (Succeeds 8))))
+        `endsIn` [Gave 3 (Succeeded (Number 8))]
+    it "are dropped, the oldest first, when there is no room" $
+      foldr Then (WaitUntil (Watched "p")) (replicate 3 Deliver ++ replicate 3 (HandleNext (act "h" 1 (Succeeds 7))))
+        `endsIn` [Gave 100 (Succeeded timeIsUp)]
+
   describe "Signals made of others" $ do
     it "can require several conditions to hold" $
       with [Change 1 "p" (At 1), Change 2 "q" (At 1)] (WaitUntil (And (Watched "p") (Watched "q")))
@@ -474,6 +498,14 @@ relation = do
   -- Another thread cancels it at 2 and at 3.
   cancelledTwice p = (with [] p) {cancelAt = 2, caller = PlainThread Asynchronous 1}
   endsIn p = endsWith (with [] p)
+  -- What the actions with these names do, in each of its timelines.
+  does p names these =
+    fmap (Set.map (filter (ofThem . snd) . timeline)) (paths 10000 whatIsDone (with [] p))
+      `shouldBe` Just (Set.singleton these)
+   where
+    ofThem = \case
+      Action name _ -> name `elem` names
+      _ -> False
   endsWith world expected = fmap (Set.map end) (paths 10000 whatIsDone world) `shouldBe` Just (Set.fromList expected)
   hasTimeline world transitions =
     fmap (Set.map timeline) (paths 10000 whatIsDone world) `shouldBe` Just (Set.singleton transitions)

@@ -16,6 +16,7 @@ module Language.Operator
   , operatorName
   , forks
   , abandons
+  , receives
 
     -- * Random operators
   , Around (..)
@@ -36,7 +37,7 @@ module Language.Operator
     -- * The library's operators
   , Language (..)
   , Environment (..)
-  , noEnvironment
+  , environmentWith
   , run
   , holds
   ) where
@@ -47,6 +48,7 @@ import Data.Maybe (catMaybes, fromMaybe, isNothing)
 import Test.QuickCheck (Gen, choose, frequency, suchThat, vectorOf)
 
 import Behavior
+import Behavior.Message (Inbox, handleNext, onMessage)
 import Behavior.Parallel (Child, allOf, await, decide, firstOf, fork, requestStop, scoped)
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal)
@@ -85,6 +87,10 @@ data Operator s p
   | CleanupWithin Ticks p
   | -- | The part may go on when the operator has ended; so it uses no scope and no shared signal around it.
     Abandoning Ticks p
+  | -- | What handles each message, and the task that runs meanwhile.
+    OnMessage p p
+  | -- | Waits for a message.
+    HandleNext p
   | -- | The part may follow the signal, as the shared one.
     WithShared s p
   | Scoped p
@@ -130,6 +136,8 @@ traverseBoth signal part = \case
   Timeout n a -> Timeout n <$> part a
   CleanupWithin n a -> CleanupWithin n <$> part a
   Abandoning n a -> Abandoning n <$> part a
+  OnMessage a b -> OnMessage <$> part a <*> part b
+  HandleNext a -> HandleNext <$> part a
   WithShared s a -> WithShared <$> signal s <*> part a
   Scoped a -> Scoped <$> part a
   Fork a -> Fork <$> part a
@@ -154,6 +162,7 @@ operatorName = \case
   Timeout _ _ -> Just "timeout"
   CleanupWithin _ _ -> Just "cleanupWithin"
   Abandoning _ _ -> Just "abandoning"
+  OnMessage _ _ -> Just "onMessage"
   WithShared _ _ -> Just "withShared"
   Scoped _ -> Just "scoped"
   _ -> Nothing
@@ -170,6 +179,13 @@ forks = \case
 abandons :: Operator s p -> Bool
 abandons = \case
   Abandoning _ _ -> True
+  _ -> False
+
+-- | Whether it handles messages.
+receives :: Operator s p -> Bool
+receives = \case
+  OnMessage _ _ -> True
+  HandleNext _ -> True
   _ -> False
 
 -- * Random operators
@@ -225,6 +241,8 @@ shapes around =
     , (2, (`Timeout` ()) <$> frequency [(1, pure 0), (9, choose (1, 6))])
     , (1, (`CleanupWithin` ()) <$> choose (0, 4))
     , (2, (`Abandoning` ()) <$> choose (0, 3))
+    , (2, pure (OnMessage () ()))
+    , (1, pure (HandleNext ()))
     , (2, pure (WithShared () ()))
     , (2, pure (Scoped ()))
     ]
@@ -292,6 +310,8 @@ data Language at s p a = Language
   -- ^ The position in the branch with this label, of the operator with that position.
   , signalOf :: Environment at a -> at -> s -> Signal Int
   -- ^ Its sensors have that position.
+  , reactsTo :: Signal Int -> Signal Int
+  -- ^ The whole signal to which an operator reacts ('WithShared' does not).
   , tick :: Seconds
   , results :: Maybe [a] -> a
   -- ^ What an operator returns that has several results, or none.
@@ -303,13 +323,16 @@ data Environment at a = Environment
   -- ^ Forks into the nearest scope.
   , nearest :: Signal Int
   -- ^ The nearest shared signal.
+  , inbox :: Inbox ()
   }
 
-noEnvironment :: Environment at a
-noEnvironment =
+-- | What a whole program gets.
+environmentWith :: Inbox () -> Environment at a
+environmentWith box =
   Environment
     { forking = \_ -> throwIO (ErrorCall "a fork outside every scope")
     , nearest = pure 0
+    , inbox = box
     }
 
 -- | Runs the operator. Its first position is that of what runs in its own thread; the second is its own.
@@ -337,7 +360,9 @@ run language around outer own o = case o of
   Timeout n a -> timeout (ticks n) (branch "branch" a)
   CleanupWithin n a -> fromMaybe none <$> cleanupWithin (ticks n) (branch "branch" a)
   Abandoning n a -> abandoning (ticks n) (branch "branch" a)
-  WithShared s a -> Signal.withShared (level s) (\signal -> branchIn around {nearest = signal} "body" a)
+  OnMessage a b -> onMessage (inbox around) (\() -> pure () <$ branch "handler" a) (branch "task" b)
+  HandleNext a -> handleNext (inbox around) (\() -> pure <$> inPlace a)
+  WithShared s a -> Signal.withShared (opened s) (\signal -> branchIn around {nearest = signal} "body" a)
   Scoped a -> scoped $ \nursery ->
     branchIn around {forking = \forked -> fork nursery (forked (labelled "fork"))} "body" a
   Fork a -> none <$ child a
@@ -350,7 +375,8 @@ run language around outer own o = case o of
   child a = forking around (\at -> runPart language around at a)
   labelled name = inBranch language (maybe "" (++ ": ") (operatorName o) ++ name) own
   each as = [branch (show n) a | (n, a) <- zip [1 :: Int ..] as]
-  level = signalOf language around (labelled "polling")
+  opened = signalOf language around (labelled "polling")
+  level = reactsTo language . opened
   condition s = holds <$> level s
   several = results language . Just
   none = results language Nothing

@@ -24,15 +24,17 @@ programs wanted = go O.outside
   go around 0 =
     frequency $
       [(30, action), (1, Pure . Number <$> choose (0, 2)), (1, Sleep <$> choose (0, 3))]
+        ++ [(3, pure Deliver) | wanted (O.HandleNext ())]
         ++ [(1, WaitUntil <$> signal around 0) | wanted (O.WaitUntil ())]
         ++ [(14, Op <$> O.operators O.forks around (const (pure Shared)) (const action)) | inScope around]
   go around n =
     frequency [(1, go around 0), (42, O.operators wanted around (`signal` (n - 1)) less >>= fmap Op . inTime)]
    where
     less inside = frequency [(1, choose (0, n - 1)), (2, pure (n - 1))] >>= go inside
-  -- A recovery that takes no time would repeat for ever while the condition holds.
+  -- A recovery that takes no time would repeat for ever while the condition holds; so would a handler that delivers.
   inTime = \case
     O.Monitor s recovery task -> (\a -> O.Monitor s (takingTime a `Then` recovery) task) <$> script
+    O.OnMessage handler task -> (\a -> O.OnMessage (takingTime a `Then` handler) task) <$> script
     o -> pure o
   takingTime s = Do "a" [s {takes = max 1 (takes s)}]
   signal around n =
@@ -83,6 +85,7 @@ shrinkProgram p = filter isWellFormed (parts p ++ smaller p)
   smaller = \case
     Do name scripts -> [Do name some | some <- shrinkList shrinkScript scripts, not (null some)]
     Pure Unit -> []
+    Deliver -> [Pure Unit]
     Sleep n -> Pure Unit : [Sleep (n - 1) | n > 0]
     Pure _ -> [Pure Unit]
     Op o -> Op <$> O.shrinkOperator shrinkSignal (\q -> parts q ++ smaller q) o
@@ -115,8 +118,8 @@ withNames = O.numbered . go
     Op o -> Op <$> O.traverseBoth (traverse go) go o
     p -> pure p
 
--- | Whether each fork is in a scope, and each shared signal where there is one; and whether each recovery takes
--- time: otherwise it would repeat for ever while the condition holds.
+-- | Whether each fork is in a scope, and each shared signal where there is one; and whether each recovery and
+-- each handler takes time: otherwise it might repeat for ever.
 isWellFormed :: Program -> Bool
 isWellFormed = go O.outside
  where
@@ -130,6 +133,7 @@ isWellFormed = go O.outside
     _ -> True
   takesTime = \case
     O.Monitor _ recovery _ -> beginsLong recovery
+    O.OnMessage handler _ -> beginsLong handler
     _ -> True
   beginsLong = \case
     Do _ scripts -> all ((> 0) . takes) scripts

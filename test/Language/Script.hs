@@ -16,7 +16,8 @@ module Language.Script
       ( ..
       , Then, Else, Attempt, FallbackOver, Parallel, Both, FirstOf, AllOf
       , Decide, RSelect, Monitor, InsteadWhen, Switch, TeleoReactive, WaitUntil, WhileHolding
-      , Timeout, CleanupWithin, Abandoning, Retrying, Every, WithShared, Scoped, Fork, Await, StopChild
+      , Timeout, CleanupWithin, Abandoning, Retrying, Every, OnMessage, HandleNext
+      , WithShared, Scoped, Fork, Await, StopChild
       )
   , Signal
   , SignalOf (..)
@@ -36,6 +37,7 @@ module Language.Script
   , parts
   , signals
   , usesShared
+  , usesMessages
   , depth
   , programName
 
@@ -63,6 +65,8 @@ data Program
     Pure Value
   | -- | Takes time.
     Sleep Ticks
+  | -- | Delivers a message.
+    Deliver
   | Op (O.Operator Signal Program)
   deriving (Eq, Ord)
 
@@ -71,6 +75,7 @@ instance Show Program where
   showsPrec d = \case
     Do name scripts -> showParen (d > 10) $ showString "Do " . showsPrec 11 name . showString " " . showsPrec 11 scripts
     Sleep n -> showParen (d > 10) $ showString "Sleep " . showsPrec 11 n
+    Deliver -> showString "Deliver"
     Pure value -> showParen (d > 10) $ showString "Pure " . showsPrec 11 value
     Op o -> showsPrec d o
 
@@ -144,15 +149,17 @@ data ActionEvent
     Stops
   deriving (Eq, Ord, Show)
 
-pattern Then, Else, Parallel, Both, Await, StopChild :: Program -> Program -> Program
+pattern Then, Else, Parallel, Both, OnMessage, Await, StopChild :: Program -> Program -> Program
 pattern Then a b = Op (O.Then a b)
 pattern Else a b = Op (O.Else a b)
 pattern Parallel a b = Op (O.Parallel a b)
 pattern Both a b = Op (O.Both a b)
+pattern OnMessage a b = Op (O.OnMessage a b)
 pattern Await a b = Op (O.Await a b)
 pattern StopChild a b = Op (O.StopChild a b)
 
-pattern Scoped, Fork :: Program -> Program
+pattern HandleNext, Scoped, Fork :: Program -> Program
+pattern HandleNext a = Op (O.HandleNext a)
 pattern Scoped a = Op (O.Scoped a)
 pattern Fork a = Op (O.Fork a)
 
@@ -195,7 +202,7 @@ pattern WithShared a b = Op (O.WithShared a b)
 {-# COMPLETE
   Do, Pure, Sleep, Then, Else, Attempt, FallbackOver, Retrying, Every, Parallel, Both, FirstOf, AllOf, Decide, RSelect
   , Monitor, InsteadWhen, Switch, TeleoReactive, WaitUntil, WhileHolding, Timeout, CleanupWithin, Abandoning
-  , WithShared, Scoped, Fork, Await, StopChild
+  , OnMessage, HandleNext, WithShared, Scoped, Fork, Await, StopChild, Deliver
   #-}
 
 -- * The parts of a program
@@ -223,6 +230,13 @@ usesShared = \case
   Debounce _ s -> usesShared s
   Throttle _ s -> usesShared s
   StaleAfter _ s -> usesShared s
+
+-- | Whether it delivers or handles messages.
+usesMessages :: Program -> Bool
+usesMessages p = case p of
+  Deliver -> True
+  Op o | O.receives o -> True
+  _ -> any usesMessages (parts p)
 
 depth :: Program -> Int
 depth p = maximum (0 : map ((+ 1) . depth) (parts p))

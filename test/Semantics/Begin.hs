@@ -28,7 +28,7 @@ initial :: World -> State
 initial world =
   State
     { now = start
-    , running = case caller world of
+    , running = (if usesMessages (program world) then Closing else id) $ case caller world of
         Operator ->
           Waiting
             Race
@@ -42,7 +42,7 @@ initial world =
   start =
     Now
       { clock = 0
-      , levels = Map.fromList (conditions world)
+      , levels = Map.fromList ((messages, At 0) : conditions world)
       , calls = Map.empty
       , shared = []
       , childResults = Map.empty
@@ -68,6 +68,8 @@ begin t p = case p of
   Retrying [] act -> begin t act
   Retrying (wait : later) act -> begin t (act `Else` (Sleep wait `Then` Retrying later act))
   Every interval act -> inSlot interval (clock t) act (begin t act)
+  Deliver -> Delivering
+  HandleNext act -> Entering (Taking True act)
   Parallel left right -> Waiting Race [thread t "parallel: left" (void left), thread t "parallel: right" (void right)]
   Both left right -> Waiting Gather [thread t "both: left" left, thread t "both: right" right] `AndThen` Pure Unit
   FirstOf [] -> Over (FailedWith noAlternative)
@@ -82,7 +84,7 @@ begin t p = case p of
   Await act meanwhile -> Forking act (Just (False, meanwhile))
   StopChild act meanwhile -> Forking act (Just (True, meanwhile))
   Timeout most _ -> before most
-  CleanupWithin most _ -> Uninterruptibly (before most)
+  CleanupWithin most _ -> Entering (Uninterruptibly (before most))
   Abandoning most act -> Waiting (Abandon most) [thread t "abandoning: branch" act]
   _ | any usesShared (signals p) -> Opening p
     | otherwise -> opened t p
@@ -96,6 +98,7 @@ opened :: Now -> Program -> Running
 opened t p = case p of
   WithShared signal body -> Sharing (open t signal) (thread t "withShared: body" body)
   TeleoReactive rules -> following (startSource t (Joined FirstHolding (map (unstarted . fst) rules)))
+  OnMessage _ _ -> following (Watching messages)
   _ -> case signals p of
     signal : _ -> following (open t signal)
     [] -> error "opened: this operator has no signal"

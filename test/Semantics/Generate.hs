@@ -34,7 +34,8 @@ smallWorlds = do
   first <- At <$> choose (0, 1)
   n <- choose (0, 2)
   later <- inOrder <$> vectorOf n (Change <$> choose (0, 2) <*> pure "p" <*> someLevel)
-  World [("p", first), ("q", At 0)] later <$> choose (2, 4) <*> someProgram (const True) 1 <*> callers <*> pure 0
+  let anything = someProgram (const True) 1
+  World [("p", first), ("q", At 0)] later <$> choose (2, 4) <*> anything <*> callers <*> pure 0
  where
   someLevel = frequency [(4, At <$> choose (0, 1)), (1, pure NoValue)]
 

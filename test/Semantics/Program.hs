@@ -26,6 +26,8 @@ module Semantics.Program
   , timedOut
   , overdueBy
   , timeIsUp
+  , messages
+  , roomForMessages
   ) where
 
 import Language.Script
@@ -98,6 +100,14 @@ data Transition
 
 -- | The observed transitions and their times.
 type Timeline = [(Ticks, Transition)]
+
+-- | The condition whose level is the number of messages that wait.
+messages :: Condition
+messages = "messages"
+
+-- | How many messages can wait; the oldest is dropped.
+roomForMessages :: Int
+roomForMessages = 2
 
 -- The library's own failures.
 

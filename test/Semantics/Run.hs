@@ -33,6 +33,7 @@ import qualified Data.Set as Set
 
 import Behavior.Internal.Failure
 import Behavior.Internal.Runtime
+import Behavior.Message (withInbox)
 import Behavior.Parallel (firstOf)
 import Behavior.Signal (debounce, hysteresis, polling, staleAfter, throttle, watching)
 import qualified Behavior.Signal as Library
@@ -51,7 +52,7 @@ import Behavior.Sim
   , simulateWith
   )
 import qualified Behavior.Sim as Sim
-import Language.Operator (Environment (..), Language (..), noEnvironment, run)
+import Language.Operator (Environment (..), Language (..), environmentWith, run)
 import Language.Perform
 import Semantics.Path (End (..), Seen (..))
 import Semantics.Program
@@ -148,14 +149,15 @@ observing instrument simulated world = do
 data Context = Context
   { levels :: Map Condition (TVar Level)
   , calls :: IORef (Map Name Int)
+  , deliver :: Behavior ()
   }
 
 -- | The world's program and environment. The given action receives each transition; it must
 -- not be a scheduling point.
 behavior :: Instrument position -> (Transition -> IO ()) -> World -> Behavior Value
-behavior instrument emit world = do
-  context <- Context <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty
-  let running within = runPart (language instrument emit context) noEnvironment within (program world)
+behavior instrument emit world = withMessages $ \delivers box -> do
+  context <- Context <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure delivers
+  let running within = runPart (language instrument emit context) (environmentWith box) within (program world)
   case caller world of
     Operator -> aroundPart instrument (root instrument) (FirstOf [program world]) $ \_ within ->
       firstOf [running (branchOf instrument "firstOf: 1" within), timeIsUp <$ environment context]
@@ -178,6 +180,13 @@ behavior instrument emit world = do
         atomically (writeTVar var level) >> whenSet instrument condition level
       emit (condition `Becomes` level)
     sleepUntil (fromIntegral (cancelAt world))
+  -- (To close the inbox is a step.)
+  withMessages act
+    | usesMessages (program world) = do
+        driver <- newIORef (\() -> pure ())
+        withInbox roomForMessages (\delivers -> pure () <$ writeIORef driver delivers) $
+          act (readIORef driver >>= \delivers -> delivers ())
+    | otherwise = act (pure ()) (error "a program without messages has no inbox")
 
 -- | How the parts of a program run.
 language :: Instrument position -> (Transition -> IO ()) -> Context -> Language position Signal Program Value
@@ -187,7 +196,8 @@ language instrument emit context = this
     Language
       { runPart = \around here p -> aroundPart instrument here p (part around p)
       , inBranch = branchOf instrument
-      , signalOf = \around sensor signal -> ofSignal instrument Nothing (level around sensor signal)
+      , signalOf = level
+      , reactsTo = ofSignal instrument Nothing
       , tick = 1
       , results = maybe Unit Several
       }
@@ -199,6 +209,7 @@ language instrument emit context = this
       perform (acting outer) name (scripts !! min n (length scripts - 1))
     Pure value -> pure value
     Sleep n -> Unit <$ sleep (fromIntegral n)
+    Deliver -> Unit <$ deliver context
     Op o -> run this around outer own o
   acting here =
     Acting

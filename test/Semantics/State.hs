@@ -111,7 +111,16 @@ data Running
     InSlot Ticks Ticks Program Running
   | -- | Until that slot.
     AwaitingSlot Ticks Ticks Program
+  | -- | What follows masks stop requests; one that is pending is received before.
+    Entering Running
   | Uninterruptibly Running
+  | Delivering
+  | -- | What handles a message that waits is about to begin. Without one: whether it is awaited.
+    Taking Bool Program
+  | -- | What handles a message, which is put back if it does not succeed.
+    Handling Running
+  | -- | After this, the inbox is closed.
+    Closing Running
   | -- | A thread whose stop was requested, which is awaited until the given time, and then abandoned.
     GivingUp Ticks Thread
   | -- | The environment, with the changes to come and the time at which it ends.
@@ -270,6 +279,8 @@ dueTimes = \case
   InSlot _ _ _ r -> dueTimes r
   AwaitingSlot _ due _ -> [due]
   Uninterruptibly r -> dueTimes r
+  Handling r -> dueTimes r
+  Closing r -> dueTimes r
   GivingUp due branch -> due : ofThreads [branch]
   StoppingChild _ r -> dueTimes r
   AwaitingChild _ r -> dueTimes r
@@ -304,6 +315,8 @@ afterTimePassed = \case
   first `OrElse` second -> afterTimePassed first `OrElse` second
   InSlot interval from p r -> InSlot interval from p (afterTimePassed r)
   Uninterruptibly r -> Uninterruptibly (afterTimePassed r)
+  Handling r -> Handling (afterTimePassed r)
+  Closing r -> Closing (afterTimePassed r)
   GivingUp due branch -> GivingUp due (threadAfter branch)
   StoppingChild k r -> StoppingChild k (afterTimePassed r)
   AwaitingChild k r -> AwaitingChild k (afterTimePassed r)

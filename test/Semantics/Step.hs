@@ -78,6 +78,7 @@ steps t = \case
     -- Slots that were missed are skipped.
     | due < clock t -> silently t (AwaitingSlot interval (due + interval) p)
     | otherwise -> [begun | clock t >= due, begun <- silently t (inSlot interval due p (continued t p))]
+  Entering r -> silently t r
   Uninterruptibly (Over result) -> silently t (Over result)
   Uninterruptibly r -> [(l, t', Uninterruptibly r') | (l, t', r') <- steps t r]
   GivingUp due branch
@@ -88,6 +89,16 @@ steps t = \case
              | clock t >= due
              , gone <- silently t {abandoned = abandoned t ++ [branch]} (Over (Stopped Nothing))
              ]
+  Delivering -> silently (withOneMore t) (Over (Succeeded Unit))
+  Taking awaited p -> case Map.lookup messages (levels t) of
+    Just (At n) | n > 0 -> silently t {levels = Map.insert messages (At (n - 1)) (levels t)} (Handling (Starting p))
+    _ | awaited -> []
+    _ -> silently t (Over (Succeeded Unit))
+  Handling (Over result@(Succeeded _)) -> silently t (Over result)
+  Handling (Over wrong) -> silently (withOneMore t) (Over wrong)
+  Handling r -> [(l, t', Handling r') | (l, t', r') <- steps t r]
+  Closing (Over result) -> silently t (Over result)
+  Closing r -> [(l, t', Closing r') | (l, t', r') <- steps t r]
   Waiting operator threads ->
     case verdict operator threads of
       Just result -> silently t (conclude operator result noSource threads)
@@ -198,6 +209,14 @@ steps t = \case
     Just (Stopped Nothing) -> True
     _ -> False
 
+-- | With another message; if there is no room, the oldest is dropped.
+withOneMore :: Now -> Now
+withOneMore t = t {levels = Map.adjust more messages (levels t)}
+ where
+  more = \case
+    At n -> At (min roomForMessages (n + 1))
+    level -> level
+
 -- | Applies the function unless it has ended without success.
 whenSuccessful :: (Running -> Running) -> Running -> Running
 whenSuccessful next = \case
@@ -266,7 +285,15 @@ receive t = \case
   Sleeping _ -> stopped
   InSlot interval from p r -> fmap (inSlot interval from p) <$> receive t r
   AwaitingSlot {} -> stopped
+  Entering _ -> stopped
   Uninterruptibly _ -> []
+  Delivering -> stopped
+  Taking awaited _
+    | awaited, Just (At 0) <- Map.lookup messages (levels t) -> stopped
+    | otherwise -> []
+  Handling (Over _) -> []
+  Handling r -> fmap Handling <$> receive t r
+  Closing _ -> []
   GivingUp _ _ -> []
   Waiting (Abandon most) threads ->
     [ (Silent, case some of [] -> Over (Stopped Nothing); branch : _ -> GivingUp (clock t + most) (requestStop branch))
@@ -381,10 +408,17 @@ reactions t p source v phase = case phase of
     (RunToEnd recovery, _) -> recover (Just branch) source recovery
     (_, Stopped _) -> Reacting p source (viewOf t source) (Choosing Reread)
     _ -> conclude React result source [branch]
-  recover before source' recovery = Reacting p source' v (Recovering before (thread t (recoveryOf p) recovery))
+  recover before source' recovery = Reacting p source' v (Recovering before (recoveryThread recovery))
+  recoveryThread recovery = case p of
+    OnMessage _ _ -> Thread (recoveryOf p) (Live NotStarted (Entering (Taking False recovery)))
+    _ -> thread t (recoveryOf p) recovery
+  beginsAgain = case p of
+    Monitor {} -> True
+    OnMessage _ _ -> True
+    _ -> False
   recovered before result recovery = case (before >>= endOf, result) of
     (Just wrong, _) -> conclude React wrong source (maybe id (:) before [recovery])
-    (_, Succeeded _) | Monitor {} <- p -> afterSensorStep t p source v AwaitingSensors
+    (_, Succeeded _) | beginsAgain -> afterSensorStep t p source v AwaitingSensors
     _ -> conclude React result source [recovery]
 
 -- | The operator after a step of its sensors.

@@ -110,6 +110,7 @@ response :: Program -> Int -> Response
 response p value = case p of
   RSelect _ left right -> Run (if isTrue then left else right)
   Monitor _ recovery task -> if isTrue then RunToEnd recovery else Run task
+  OnMessage handler task -> if isTrue then RunToEnd handler else Run task
   InsteadWhen _ emergency act -> if isTrue then RunToEnd emergency else Run act
   Switch _ branches -> Run (branches !! max 0 (min value (length branches - 1)))
   TeleoReactive rules -> if value < 0 then Idle else Run (snd (rules !! value))
@@ -127,6 +128,7 @@ nameOf p value = case p of
   RSelect {} -> if holds value then "rSelect: left" else "rSelect: right"
   Monitor {} -> "monitor: task"
   InsteadWhen {} -> "insteadWhen: branch"
+  OnMessage {} -> "onMessage: task"
   Switch {} -> "switch: branch"
   TeleoReactive _ -> "teleoReactive: rule " ++ show (value + 1)
   WhileHolding {} -> "whileHolding: branch"
@@ -137,4 +139,5 @@ nameOf p value = case p of
 recoveryOf :: Program -> BranchLabel
 recoveryOf p = case p of
   InsteadWhen {} -> "insteadWhen: emergency"
+  OnMessage {} -> "onMessage: handler"
   _ -> "monitor: recovery"

@@ -496,9 +496,11 @@ values x =
       -- (Equal changes are reported once.)
       TeleoReactive _ ->
         not (null levels) && (not (direct p) || and [holds (read was) /= holds (read now) | (Just was, now) <- levels])
+      -- (What its signal is, MessagesSpec says.)
+      OnMessage _ _ -> null levels
       _ -> isJust (timeLimit p) && null levels
   isTeleoReactive = \case TeleoReactive _ -> True; _ -> False
-  direct p = not (any (`isInfixOf` show (Program.signals p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
+  direct p = programName p /= Just "onMessage" && not (any (`isInfixOf` show (Program.signals p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
   -- The numbers of the spans before and after say where in the record the operator decided.
   held at r c =
     let n = reactionNumber r
