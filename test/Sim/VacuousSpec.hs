@@ -9,7 +9,7 @@ import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception (AsyncException (ThreadKilled), ErrorCall (..), finally, throwIO)
 import Control.Monad (forever, void, when)
 import Data.Foldable (for_)
-import Data.IORef (modifyIORef, newIORef, readIORef)
+import Data.IORef (modifyIORef, newIORef, readIORef, writeIORef)
 import Data.List (isInfixOf)
 import Test.Hspec hiding (parallel)
 import Test.QuickCheck (Args (chatty), Result (output), quickCheckWithResult, stdArgs, (==>))
@@ -85,6 +85,21 @@ worlds = do
         orders <- driver world "orders" [(1, "tea")]
         withInbox 9 orders $ \inbox -> void (simulating (onMessage inbox (\_ -> pure (pure ())) (sleep 60))))
       `shouldFailWith` "started outside of the simulation"
+  it "has a record that no other exploration can be judged by" $ do
+    kept <- newIORef Nothing
+    _ <- explore (randomly 1) $ \simulating -> do
+      (world, drive, _) <- rover
+      writeIORef kept (Just world)
+      void (simulating drive)
+      world `shouldRecord` exactly 1 (successOf "drive")
+    old <- readIORef kept >>= maybe (fail "no world") pure
+    -- Outside of explorations it can be read.
+    old `shouldRecord` exactly 1 (successOf "drive")
+    for_ [id, \property simulating -> property simulating `catchAny` \_ -> pure ()] $ \whole ->
+      tryExplore (randomly 2) (whole (\simulating -> do
+          void (simulating (sleep 1))
+          old `shouldRecord` exactly 1 (successOf "drive")))
+        `shouldFailWith` "made in another test"
   it "is not used by what only the unwinding of a run does with it" $ do
     (world, drive, _) <- rover
     void (simulateWith defaultSimOptions {endAt = 1} (sleep 5 `finally` drive))

@@ -114,10 +114,7 @@ clock mock = do
   -- that a property runs.
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
       begins = goesOn && (isJust here || isNothing property)
-      refuse why = do
-        writeIORef (misuse mock) (Just (ErrorCall why))
-        mapM_ (`keepMistake` ErrorCall why) property
-        throwIO (ErrorCall why)
+      refuse why = writeIORef (misuse mock) (Just (ErrorCall why)) >> mistake property why
   begun <- atomicModifyIORef' (beginning mock) $ \old -> (old <|> (if begins then Just first else Nothing), old)
   case begun of
     Nothing
@@ -126,6 +123,10 @@ clock mock = do
     Just own | ownRun own /= ownRun first -> refuse (belongsTo own first)
     _ -> pure ()
   pure (maybe t startTime begun, t)
+
+-- | Throws a mistake, which fails the property also if that catches it.
+mistake :: Maybe Property -> String -> IO a
+mistake property why = mapM_ (`keepMistake` ErrorCall why) property >> throwIO (ErrorCall why)
 
 -- | The property of an exploration that uses this world.
 ownProperty :: Mock -> IO (Maybe Property)
@@ -206,12 +207,17 @@ checkTimes mayFollow rule times = for_ (zip (Nothing : map Just times) (take 100
 -- [Begins,Succeeds]
 --
 -- [Fault] Throws the 'ErrorCall' again, if the world was used in a run that it does not belong to (see
---   'begin'); and one, if nothing has used the world: then there is no record, and not an empty one.
+--   'begin'); one, if nothing has used the world: then there is no record, and not an empty one; and in an
+--   exploration one, if the world was made for another schedule.
 --
 -- @since 0.1.0.0
 happened :: Mock -> IO Record
 happened mock = do
   readIORef (misuse mock) >>= mapM_ throwIO
+  property <- currentProperty
+  when (isJust property && isJust (madeIn mock) && property /= madeIn mock) . mistake property $
+    "this world was made in another test of an exploration, and its record is of that one: make a new one in the \
+    \property, for each schedule"
   begun <- readIORef (beginning mock)
   when (isNothing begun) . throwIO . ErrorCall $
     "nothing has used this world, so there is no record to judge; if that is right, begin it: \

@@ -35,6 +35,7 @@ data Property = Property
   { mistake :: IORef (Maybe SomeException)
   , premises :: IORef (Map String Bool)
   }
+  deriving (Eq)
 
 -- | The properties by the numbers of their threads. (A thread that is kept here could not be found to be
 -- blocked for ever.)
