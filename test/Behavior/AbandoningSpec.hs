@@ -68,6 +68,15 @@ spec = guarded . describe "abandoning" $ do
             sleep 5
           readIORef abandoned `shouldReturn` expected
 
+    it "is awaited by a thread that does not belong to the trace around it" $ do
+      entries <- newLog
+      _ <- simulate . watchingThreads (note entries) $ do
+        timeout 1 (abandoning 1 (hang `onException` uninterruptibleMask_ (sleep 2))) ? pure ()
+        sleep 5
+      started <- notes entries
+      started `shouldContain` [Started (Label "abandoning" "clock")]
+      started `shouldNotContain` [Started (Label "abandoning" "watcher")]
+
     it "is counted right under any schedule if it ends just as its time is up" $
       void . explore (exhaustively 1) $ \simulate' -> do
         counted <- newIORef (-1)

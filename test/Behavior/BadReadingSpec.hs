@@ -91,6 +91,16 @@ goingWrong = do
         Faulting -> CancelledWithFault (show (Cancel "the caller")) (show (Fault "reading"))
         _ -> CancelledBy (show (Cancel "the caller"))
 
+  it "cannot be interrupted, and faults when its stop is pending, loses no fault" $ do
+    entered <- newGate
+    mayEnd <- newGate
+    level <- newSensor $ \n ->
+      when (n == 2) . uninterruptibleMask_ $ open entered >> pass mayEnd >> throwIO (Fault "reading")
+    withThread (Signal.switch (sensing level) (\_ -> pass entered)) $ \caller -> do
+      awaitThrown (asyncThreadId caller)
+      open mayEnd
+      awaitEnd caller `shouldReturn` FaultedWith (show (Fault "reading"))
+
   it "cannot be interrupted ends before its operator does" $ do
     entries <- newLog
     started <- newGate

@@ -236,6 +236,22 @@ counting = do
       void (atomically (receive box))
       count `shouldReturn` 0
 
+  it "counts a message that a rule handles, for the whole inbox" $ do
+    counted <- newTVarIO 0
+    withInbox 9 (delivering "a") $ \box -> do
+      handling <- messageRule box (\_ -> writeTVar counted <$> atomically (unhandled box))
+      Signal.teleoReactive [handling, (pure True, pure ())]
+    readTVarIO counted `shouldReturn` 1
+
+  it "no longer counts a message where the effect of its transaction is seen" $
+    void . explore (exhaustively 1) $ \simulate' -> do
+      done <- newTVarIO False
+      found <- newIORef (-1)
+      _ <- simulate' . withInbox 9 (delivering "a") $ \box ->
+        handleNext box (\_ -> pure (writeTVar done True))
+          `both` (atomically (readTVar done >>= check >> unhandled box) >>= writeIORef found)
+      readIORef found `shouldReturn` 0
+
   it "is zero when all that was delivered has been handled" $ do
     done <- newTVarIO ""
     withInbox 9 (delivering "abc") $ \box -> do

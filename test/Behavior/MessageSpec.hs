@@ -6,7 +6,7 @@ module Behavior.MessageSpec (spec) where
 import Control.Concurrent (yield)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception hiding (handle)
-import Control.Monad (replicateM_, unless, void)
+import Control.Monad (replicateM, replicateM_, unless, void)
 import Data.Foldable (for_, traverse_)
 import Data.IORef
 import Data.List (sort)
@@ -18,7 +18,7 @@ import Behavior
 import Behavior.Message
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (Plan, exhaustively, explore, randomly, simulate)
+import Behavior.Sim (Outcome (Returned), Plan, Run (outcome), exhaustively, explain, explore, randomly, simulate)
 import Behavior.Sim.Mock (driver, eventually, happened, newMock, noted, shouldRecord)
 import qualified Behavior.Sim.Mock as Mock
 import Behavior.Time (now)
@@ -131,6 +131,28 @@ handlingEach = do
       let consume = onMessage box (\m -> yield >> pure (modifyTVar' done (m :))) hang
       (consume `both` consume) ||| atomically (readTVar done >>= check . (== 300) . length)
     sort <$> readTVarIO done `shouldReturn` [1 .. 300]
+
+  it "goes on with its task if another consumer has taken the message" $
+    void . explore (randomly 300) $ \simulate' -> do
+      begun <- newTVarIO (0 :: Int)
+      run <- simulate' . withInbox 1 (\deliver -> pure () <$ deliver 'a') $ \box -> do
+        let consume = onMessage box (\_ -> pure (pure ())) (atomically (modifyTVar' begun (+ 1)) >> hang)
+        (consume `both` consume) ||| atomically (readTVar begun >>= check . (== 2))
+      explain (outcome run) `shouldBe` explain (Returned ())
+
+  it "puts messages whose handlers were interrupted back in their order" $
+    withInbox 9 (delivering "abc") $ \box -> do
+      let failing entered mayEnd =
+            ending (handleNext box (\_ -> open entered >> pass mayEnd >> failed) :: Behavior ())
+      [entered, entered', mayEnd, mayEnd'] <- replicateM 4 newGate
+      withThread (failing entered mayEnd) $ \first ->
+        pass entered >> withThread (failing entered' mayEnd') (\second -> do
+          pass entered'
+          open mayEnd
+          _ <- awaitEnd first
+          open mayEnd'
+          void (awaitEnd second))
+      atomically (allOf box) `shouldReturn` "abc"
 
   it "drops an interrupted message, and counts it, if newer ones fill the inbox" $ do
     callback <- newIORef (\_ -> pure ())

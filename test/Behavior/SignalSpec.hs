@@ -5,15 +5,16 @@ module Behavior.SignalSpec (spec) where
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
-import Control.Monad (unless)
+import Control.Monad (unless, void)
 import Data.Foldable (for_)
 import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (ioProperty, (===))
 
-import Behavior (both, (?))
+import Behavior (Failed (..), both, failed, (?), (|||))
 import Behavior.Internal.Runtime (Label (..), atomically)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (Outcome (Returned), Run (outcome), explain, explore, randomly)
 import Support
 import Watched
 
@@ -173,6 +174,25 @@ sharing = do
     leaked <- Signal.withShared (pure True) pure
     ending (Signal.rSelect leaked (note entries "left") (note entries "right")) `shouldReturn` closed
     notes entries `shouldReturn` []
+
+  it "is closed also when its body has failed" $ do
+    leaked <- newEmptyTMVarIO
+    ending (Signal.withShared (pure True) (\s -> atomically (putTMVar leaked s) >> failed))
+      `shouldReturn` (FailedWith (show Failed) :: Ending ())
+    atomically (takeTMVar leaked) >>= ending . Signal.waitUntil >>= (`shouldBe` closed)
+
+  it "is closed also if it is stopped before its sensors have started" $
+    void . explore (randomly 300) $ \simulate' -> do
+      leaked <- newEmptyTMVarIO
+      run <- simulate' $ do
+        Signal.withShared (Signal.polling 1 (pure True)) (\s -> atomically (putTMVar leaked s) >> hang)
+          ||| void (atomically (readTMVar leaked))
+        atomically (takeTMVar leaked) >>= ending . Signal.waitUntil
+      explain (outcome run) `shouldBe` explain (Returned (closed :: Ending ()))
+
+  it "fails where its sensor has failed with what is no reading's" $
+    ending (Signal.withShared (Signal.olderThan 1 (pure (0 / 0))) Signal.waitUntil)
+      `shouldReturn` FaultedWith "olderThan: a point in time is a number, not NaN"
 
   it "closes also for an operator that still watches it from outside" $ do
     leaked <- newEmptyTMVarIO

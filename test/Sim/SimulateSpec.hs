@@ -20,6 +20,7 @@ import Test.Hspec hiding (parallel)
 import Behavior
 import Behavior.Internal.Failure (isCancellation, isFailure)
 import Behavior.Internal.Runtime (annotate)
+import Behavior.Internal.Runtime.Counter (simulations, total)
 import Behavior.Parallel (fork, scoped)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
@@ -324,6 +325,12 @@ unwinding = do
 
 beside :: Spec
 beside = do
+  it "one that is cancelled is over: its threads are dispatched to it no more" $ do
+    before' <- total simulations
+    begun <- newGate
+    cancelling (void (simulate (open begun >> forever (sleep 1)))) (pass begun)
+      `shouldReturn` CancelledBy (show (Cancel "the caller"))
+    total simulations `shouldReturn` before'
   it "two simulations at once are independent" $ do
     let once = simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission
     alone <- once

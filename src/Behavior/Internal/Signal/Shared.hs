@@ -50,8 +50,7 @@ withShared signal body = do
   sharing source closed scope = do
     sensors <- newEmptyTMVarIO
     let shared = Signal $ \_ -> do
-          atomically stillOpen
-          running <- atomically (readTMVar sensors)
+          running <- atomically (stillOpen >> readTMVar sensors)
           let orSensorError value = stillOpen >> sensorError running >>= maybe value throwSTM
           pure source {workers = [], view = mapView orSensorError <$> view source}
         stillOpen = readTVar closed >>= \isClosed -> when isClosed (throwSTM closedError)
