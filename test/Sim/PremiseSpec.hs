@@ -30,9 +30,9 @@ spec = guarded . describe "The report of an exploration: what never came" $ do
   it "has it also if the world was made, and the claim checked, in another place" $ do
     world <- newMock
     drive <- action world "drive" [succeeds]
-    outside' <- explore (replaying NonPreemptive) $ \simulated ->
+    beside <- explore (replaying NonPreemptive) $ \simulated ->
       simulated drive >> (world `shouldRecord` whenever (failureOf "drive") mempty)
-    reportNeverCame outside' `shouldBe` ["\"drive\" fails"]
+    reportNeverCame beside `shouldBe` ["\"drive\" fails"]
     inside <- explore (randomly 3) $ \simulated -> void . simulated $ do
       own <- newMock
       begin own

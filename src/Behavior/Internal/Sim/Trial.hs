@@ -114,9 +114,11 @@ data Tally = Tally
   , covered :: !Coverage
   }
 
+-- | None yet.
 noTrials :: Tally
 noTrials = Tally {tried = 0, points = 0, otherEnds = Map.empty, covered = noCoverage}
 
+-- | With a further one.
 counting :: Tally -> Trial -> Tally
 counting before t =
   Tally
@@ -126,6 +128,7 @@ counting before t =
     , covered = withRun (traceOfRun t) (reached t) (claimed t) (covered before)
     }
 
+-- | The report, given whether these are all schedules of the plan.
 reported :: Bool -> Tally -> Report
 reported complete these =
   Report
