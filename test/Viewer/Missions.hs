@@ -2,7 +2,8 @@
 -- What happens in the pictures of "Viewer.PictureSpec".
 module Viewer.Missions
   ( -- * Missions
-    legs
+    leg
+  , legs
   , watering
   , doors
   , locked
@@ -36,9 +37,11 @@ import Viewer.Examples
 
 -- | One after the other, a second each.
 legs :: Int -> [Event]
-legs n = concatMap leg [1 .. n]
- where
-  leg k = ended k Top ("leg " ++ [toEnum (96 + k)]) (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded
+legs n = concat [leg k ("leg " ++ [toEnum (96 + k)]) | k <- [1 .. n]]
+
+-- | One of them, with that name.
+leg :: Int -> String -> [Event]
+leg k name = ended k Top name (fromIntegral k) Nothing (fromIntegral k + 1) Succeeded
 
 -- | Beds are watered; the robot recharges, and goes on.
 watering :: [Event]

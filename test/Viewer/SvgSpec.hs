@@ -26,7 +26,8 @@ spec = do
           Left why -> counterexample why False
           Right x ->
             conjoin
-              [ nub [name | Element name _ _ <- everything x] \\ words "svg style defs pattern rect g path text tspan title" === []
+              [ nub [name | Element name _ _ <- everything x]
+                  \\ words "svg style defs pattern rect g path text tspan title" === []
               , nub [name | Element _ attributes _ <- everything x, (name, _) <- attributes]
                   \\ words "xmlns class role aria-label width height viewBox id patternUnits d x y dx"
                   === []
@@ -37,7 +38,9 @@ spec = do
     it "with texts that could do harm" $ once (check oddEvents)
     it "without events" $ once (check [])
     it "with times that are no numbers" $
-      once (check [Ended (Span 1 Top Named "a" (0 / 0) Nothing) (1 / 0) Succeeded, Began (Span 2 Top Named "b" (-1 / 0) Nothing)])
+      once (check [ Ended (Span 1 Top Named "a" (0 / 0) Nothing) (1 / 0) Succeeded
+                  , Began (Span 2 Top Named "b" (-1 / 0) Nothing)
+                  ])
     prop "with any events" $ forAllBlind likelyEvents check
 
   it "shows the texts as they are" $
@@ -56,7 +59,10 @@ spec = do
     it "and at 100,000" $ size (long 100000) `shouldSatisfy` (< 300000)
 
   describe "shows all that failed, faulted or was stopped" $ do
-    let counts events = [(c, sum [count m | m <- bars (drawn events), c `elem` words (attribute "class" m)]) | c <- ["f", "x", "p"]]
+    let counts events =
+          [ (c, sum [count m | m <- bars (drawn events), c `elem` words (attribute "class" m)])
+          | c <- ["f", "x", "p"]
+          ]
         expected events =
           [ (c, length [() | Ended _ _ end <- events, kind end == c])
           | c <- ["f", "x", "p"]
@@ -74,7 +80,8 @@ spec = do
     it "if all were stopped" $ counts (interrupted 10000) `shouldBe` expected (interrupted 10000)
     prop "of any spans" $ forAllBlind likelyEvents $ \events -> counts events === expected events
     it "with marks that can be seen" $
-      [m | m <- bars (drawn (long 10000)), any (`elem` words (attribute "class" m)) ["f", "x", "p"], pathWidth m < 1] `shouldBe` []
+      [m | m <- bars (drawn (long 10000)), any (`elem` words (attribute "class" m)) ["f", "x", "p"], pathWidth m < 1]
+        `shouldBe` []
 
   describe "draws an interruption from the signal's change to what was stopped, and on to what was started" $ do
     it "in a mission" $ once (arrowsComplete mission)
@@ -86,16 +93,35 @@ spec = do
 
   it "labels the marker with the values" $
     textsOf (drawn mission)
-      `shouldSatisfy` elem "battery 9.4 (was 100) → batteryLow True→ stopped \"survey\" after 3.1 s (took 0.3 s) → \"recharge\""
+      `shouldSatisfy` elem "battery 9.4 (was 100) → batteryLow True\
+                           \→ stopped \"survey\" after 3.1 s (took 0.3 s) → \"recharge\""
 
   it "shows the text of a failure" $
     textsOf (drawn mission)
       `shouldSatisfy` (\texts -> all (`elem` texts) ["failed: locked", "faulted: camera: no such device"])
 
   prop "has no two texts one over the other" $
-    forAllBlind (oneof [map (renamed "drive to it") <$> likelyEvents, pure mission, failing <$> choose (1, 60), interrupted <$> choose (1, 30)]) $ \events ->
-      let texts = [(num "y" t, left, left + wide) | t@(Element "text" _ _) <- everything (drawn events), "c" `notElem` words (attribute "class" t), let wide = 5 * fromIntegral (length (textOf t)), let left = if attribute "class" t == "e" then num "x" t - wide else num "x" t]
-          overlaps = [(a, b) | (k, a@(y, left, right)) <- zip [0 :: Int ..] texts, (l, b@(y', left', _)) <- zip [0 ..] texts, k /= l, y == y', left' >= left, left' < right]
+    forAllBlind (oneof [ map (renamed "drive to it") <$> likelyEvents
+                       , pure mission
+                       , failing <$> choose (1, 60)
+                       , interrupted <$> choose (1, 30)
+                       ]) $ \events ->
+      let texts =
+            [ (num "y" t, left, left + wide)
+            | t@(Element "text" _ _) <- everything (drawn events)
+            , "c" `notElem` words (attribute "class" t)
+            , let wide = 5 * fromIntegral (length (textOf t))
+            , let left = if attribute "class" t == "e" then num "x" t - wide else num "x" t
+            ]
+          overlaps =
+            [ (a, b)
+            | (k, a@(y, left, right)) <- zip [0 :: Int ..] texts
+            , (l, b@(y', left', _)) <- zip [0 ..] texts
+            , k /= l
+            , y == y'
+            , left' >= left
+            , left' < right
+            ]
        in counterexample (show overlaps) (null overlaps)
 
 -- Each reaction has an arrow from a marker to a span that it stopped; and one from there to a span
@@ -106,16 +132,33 @@ arrowsComplete events = conjoin (map complete (reactionsOf events))
   complete r =
     counterexample (show r) $
       conjoin
-        [ counterexample "no arrow from the marker" (any (\b -> any (fromMarkerTo (not (null stopped)) b) arrows) (if null stopped then started else stopped))
+        [ counterexample "no arrow from the marker" $
+            or
+              [ fromMarkerTo (not (null stopped)) b arrow
+              | b <- if null stopped then started else stopped
+              , arrow <- arrows
+              ]
         , counterexample "no arrow to what was started" $
             null stopped || null started || or [on s a && onEdge t b | s <- stopped, t <- started, (a, b) <- arrows]
         ]
    where
-    stopped = [b | n <- nodes known, Just (_, StoppedBy (SignalChanged k _)) <- [nodeEnd n], k == reactionNumber r, b <- boxOf n]
+    stopped =
+      [ b
+      | n <- nodes known
+      , Just (_, StoppedBy (SignalChanged k _)) <- [nodeEnd n]
+      , k == reactionNumber r
+      , b <- boxOf n
+      ]
     started = [b | n <- nodes known, spanReaction (nodeSpan n) == Just (reactionNumber r), b <- boxOf n]
   -- To a place where it is clear which bar it is.
   fromMarkerTo isStopped (left, right, top, _) ((x, y), (x', y')) =
-    abs (x - x') < 12 && near y' top && x' >= left + inside (not isStopped) - 0.6 && x' <= right - inside isStopped + 0.6 && any (\(dx, dy) -> near dx x && abs (dy - y) < 8) markers
+    and
+      [ abs (x - x') < 12
+      , near y' top
+      , x' >= left + inside (not isStopped) - 0.6
+      , x' <= right - inside isStopped + 0.6
+      , any (\(dx, dy) -> near dx x && abs (dy - y) < 8) markers
+      ]
    where
     inside there = if there then min 8 ((right - left) / 3) else 0
   on (left, right, _, bottom) (x, y) = near y bottom && x >= left - 0.2 && x <= right + 0.2
@@ -124,8 +167,19 @@ arrowsComplete events = conjoin (map complete (reactionsOf events))
   known = recording events
   picture = drawn events
   arrows = arrowsOf picture
-  markers = [(x + 6, y) | e@(Element "path" _ (_ : _)) <- everything picture, attribute "class" e `elem` ["i", "io"], x : y : _ <- [numbers (attribute "d" e)]]
-  boxOf n = [box m | m <- bars picture, name : more <- [lines (textOf m)], name == spanName s, ("from " ++ secondsText (spanBegan s - recordingFrom known)) `elem` more]
+  markers =
+    [ (x + 6, y)
+    | e@(Element "path" _ (_ : _)) <- everything picture
+    , attribute "class" e `elem` ["i", "io"]
+    , x : y : _ <- [numbers (attribute "d" e)]
+    ]
+  boxOf n =
+    [ box m
+    | m <- bars picture
+    , name : more <- [lines (textOf m)]
+    , name == spanName s
+    , ("from " ++ secondsText (spanBegan s - recordingFrom known)) `elem` more
+    ]
    where
     s = nodeSpan n
   box m = (minimum xs, maximum xs, minimum ys, maximum ys)
@@ -143,7 +197,15 @@ reactionsOf = recordingReactions . recording
 
 -- Where the arrows begin and end, without those of the legend. The two strokes of the head belong to each.
 arrowsOf :: Xml -> [((Double, Double), (Double, Double))]
-arrowsOf x = concatMap ends [attribute "d" a | Element "g" _ inner <- everything x, a@(Element "path" _ _) <- inner, attribute "class" a == "ar"]
+arrowsOf x =
+  concatMap
+    ends
+    [ attribute "d" a
+    | g@(Element "g" _ inner) <- everything x
+    , attribute "class" g /= "le"
+    , a@(Element "path" _ _) <- inner
+    , attribute "class" a == "ar"
+    ]
  where
   ends d = case outline (takeWhile (/= 'm') d) of
     (xs@(_ : _ : _), ys) | any (`elem` d) "VC" -> [((head xs, head ys), (last xs, last ys))]
@@ -157,7 +219,12 @@ drawn events = either error id (readXml (svg events))
 
 -- The shapes of spans: those that have a title and are no markers.
 bars :: Xml -> [Xml]
-bars x = [e | e@(Element "path" _ inner) <- everything x, attribute "class" e `notElem` ["i", "io"], not (null [() | Element "title" _ _ <- inner])]
+bars x =
+  [ e
+  | e@(Element "path" _ inner) <- everything x
+  , attribute "class" e `notElem` ["i", "io"]
+  , not (null [() | Element "title" _ _ <- inner])
+  ]
 
 textsOf :: Xml -> [String]
 textsOf x = [textOf t | t@(Element "text" _ _) <- everything x]

@@ -31,7 +31,7 @@ newtype Sharing a = Sharing (Texts -> Parser (Shared a))
 data Shared a = Shared !a !Texts
 
 instance Functor Sharing where
-  fmap f (Sharing p) = Sharing $ \known -> (\(Shared a known') -> Shared (f a) known') <$> p known
+  fmap f (Sharing p) = Sharing (fmap (\(Shared a known) -> Shared (f a) known) . p)
 
 instance Applicative Sharing where
   pure a = Sharing (pure . Shared a)

@@ -75,6 +75,7 @@ timeline recorded =
       { usedOutcomes = map markOutcome drawn
       , usedStopping = any (isJust . stoppingFrom stopRequests) drawn
       , usedChanges = interruptionEffects interruptions
+      , usedOnward = not (null (interruptionsBelow interruptions))
       , usedPauses = not (null idle)
       , usedMerged = any isMerged drawn
       }

@@ -13,6 +13,7 @@ module Behavior.Trace.Svg.Interruptions
   , Effect (..)
   , interruptionEffects
   , arrowSample
+  , bracket
   ) where
 
 import Data.Bifunctor (bimap)
@@ -204,7 +205,7 @@ headTowards side dx dy =
   (bx, by) = (-6 * dx / far, -6 * dy / far)
   (sx, sy) = (side * dy / far, -side * dx / far)
 
--- From the lower edge of what was stopped to the lower edge of what was started, around where they meet.
+-- | From the lower edge of what was stopped to the lower edge of what was started, around where they meet.
 bracket :: Double -> (Double, Double) -> Double -> Text
 bracket depth (a, b) bottom =
   Text.concat ["M", px a, " ", px bottom, "v", px depth, "H", px b, "V", px bottom, headTowards 4 0 (-1)]

@@ -20,6 +20,8 @@ data Used = Used
   , usedStopping :: !Bool
   -- ^ A part of a bar shows that it was being stopped.
   , usedChanges :: [Effect]
+  , usedOnward :: !Bool
+  -- ^ An arrow leads from what was stopped to what started.
   , usedPauses :: !Bool
   , usedMerged :: !Bool
   -- ^ Marks for several spans.
@@ -55,10 +57,14 @@ legend left right used = (group "le" (concat drawn), maximum (0 : downs))
       , [(usedStopping used, (\x y -> shape "h" (barShape Stop x y 26 13), "while stopping"))]
       , [outcome (Running, "not ended")]
       , [(usedPauses used, (pauseSample, "waiting, or unnamed"))]
-      , [(e `elem` usedChanges used, (\x y -> arrowSample e x (y + 6.5), word)) | (e, word) <- changes]
+      , [ change (Interrupts, "a signal changed → stopped")
+        , (usedOnward used, (onwardSample, "then started"))
+        , change (OnlyStarts, "a signal changed → started")
+        ]
       , [(usedMerged used, (several, "short spans, together"))]
       ]
-  changes = [(Interrupts, "a signal changed → stopped → started"), (OnlyStarts, "a signal changed → started")]
+  change (e, word) = (e `elem` usedChanges used, (\x y -> arrowSample e x (y + 6.5), word))
+  onwardSample x y = shape "ar" (bracket 9 (x + 4, x + 22) (y + 2))
   pauseSample x y = shape "wt" (Text.concat ["M", px (x + 2), " ", px (y + 6.5), "H", px (x + 25)])
   outcome (o, word) =
     ( o `elem` usedOutcomes used
