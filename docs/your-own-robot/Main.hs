@@ -14,7 +14,7 @@ main :: IO ()
 main = do
   hSetBuffering stdout LineBuffering
   level <- newTVarIO 25
-  runBehavior . viewing noViewing {traceFile = Just "run.jsonl", timelineFile = Just "run.svg"} $
+  runBehavior . viewing defaultViewing {traceFile = Just "run.jsonl", timelineFile = Just "run.svg"} $
     mission
       Robot
         { battery = Signal.watching (readTVar level)

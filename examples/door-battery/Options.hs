@@ -15,7 +15,7 @@ import Data.List (intercalate, stripPrefix)
 import Options.Applicative
 import Text.Read (readMaybe)
 
-import Behavior.Trace.Viewing (Viewing, noViewing)
+import Behavior.Trace.Viewing (Viewing, defaultViewing)
 import ViewingOptions (viewingOptions)
 import World (DoorState (..))
 
@@ -59,7 +59,7 @@ parse arguments = execParserPure defaultPrefs commandLine arguments >>= checked
           "option --threshold: program " ++ programName (program o) ++ " is written with a \
           \threshold of its own; allowed: " ++ show printedThreshold
     | Explored _ <- mode o
-    , shown o /= noViewing =
+    , shown o /= defaultViewing =
         refuse "options --trace, --timeline and --tree show one mission; allowed: without --explore"
     | otherwise = pure o
   refuse why = Failure (parserFailure defaultPrefs commandLine (ErrorMsg why) [])

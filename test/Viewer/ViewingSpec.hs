@@ -63,8 +63,8 @@ spec = do
     (result, "") `shouldSatisfy` isProblem path
  where
   both' path = Viewing (Just path) (Just (path ++ ".svg")) False
-  trace path = noViewing {traceFile = Just path}
-  picture path = noViewing {timelineFile = Just path}
+  trace path = defaultViewing {traceFile = Just path}
+  picture path = defaultViewing {timelineFile = Just path}
   isProblem :: FilePath -> (Either IOException (), String) -> Bool
   isProblem path (result, printed) = either ((path `isInfixOf`) . show) (const False) result && null printed
 

@@ -1,13 +1,13 @@
 -- |
 -- Showing what a behaviour does, while it runs and afterwards: one call for a program's @main@.
 --
--- > main = runBehavior (viewing noViewing {timelineFile = Just "run.svg"} mission)
+-- > main = runBehavior (viewing defaultViewing {timelineFile = Just "run.svg"} mission)
 --
 -- The other modules here have the parts: "Behavior.Trace.File", "Behavior.Trace.Svg",
 -- "Behavior.Trace.Terminal", and texts.
 module Behavior.Trace.Viewing
   ( Viewing (..)
-  , noViewing
+  , defaultViewing
   , viewing
   , viewEvents
   ) where
@@ -48,8 +48,8 @@ data Viewing = Viewing
 -- | Shows nothing.
 --
 -- @since 0.1.0.0
-noViewing :: Viewing
-noViewing = Viewing {traceFile = Nothing, timelineFile = Nothing, liveTree = False}
+defaultViewing :: Viewing
+defaultViewing = Viewing {traceFile = Nothing, timelineFile = Nothing, liveTree = False}
 
 -- | Runs a behaviour in a trace ('withTrace'), and shows it.
 --
@@ -96,7 +96,7 @@ untilItFails write use = do
 -- runs give equal files.
 --
 -- > found <- tryExplore plan property
--- > either (viewEvents noViewing {timelineFile = Just "counterexample.svg"} . failingEvents) print found
+-- > either (viewEvents defaultViewing {timelineFile = Just "counterexample.svg"} . failingEvents) print found
 --
 -- @since 0.1.0.0
 viewEvents :: Viewing -> [Event] -> IO ()
