@@ -96,7 +96,7 @@ parentOf :: Value -> Parser Parent
 parentOf = \case
   String "top" -> pure Top
   String "unknown" -> pure UnknownParent
-  number'@(Number _) -> Inside <$> parseJSON number'
+  value@(Number _) -> Inside <$> parseJSON value
   _ -> fail "parent: allowed: a number, \"top\", \"unknown\""
 
 endOf :: Value -> Sharing End
@@ -133,7 +133,7 @@ secondsOf = \case
   String "inf" -> pure (1 / 0)
   String "-inf" -> pure (-1 / 0)
   String "nan" -> pure (0 / 0)
-  number'@(Number _) -> Seconds <$> parseJSON number'
+  value@(Number _) -> Seconds <$> parseJSON value
   _ -> fail "a time: allowed: a number, \"inf\", \"-inf\", \"nan\""
 
 object :: String -> (Object -> Sharing a) -> Value -> Sharing a

@@ -73,8 +73,8 @@ difference a b =
     , timesByPath =
         sortOn
           (\(_, x, y) -> Down (abs (sideTotal x - sideTotal y)))
-          [ (where', x, y)
-          | (where', inFirst, inSecond) <- timesOfBoth a b
+          [ (path, x, y)
+          | (path, inFirst, inSecond) <- timesOfBoth a b
           , let (x, y) = (side inFirst, side inSecond)
           , x /= y
           ]
@@ -212,12 +212,12 @@ renderDifference d = unlines (remarks ++ diverging ++ [""] ++ taking)
             ["difference [s]", "first [s]", "second [s]", "first runs", "second runs", "path"]
             row
             (timesByPath d)
-  row (where', x, y) =
+  row (path, x, y) =
     [ signed (sideTotal y - sideTotal x)
     , millisecondsText (sideTotal x)
     , millisecondsText (sideTotal y)
     , show (sideRuns x)
     , show (sideRuns y)
-    , renderPath where'
+    , renderPath path
     ]
   signed t = (if t > 0 then "+" else "") ++ millisecondsText t

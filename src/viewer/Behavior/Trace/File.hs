@@ -200,9 +200,9 @@ parseTrace bytes = case Bytes.split '\n' bytes of
 decodeHeader :: Bool -> Bytes.ByteString -> Either TraceError Header
 decodeHeader isLast first = case eitherDecode first of
   Right (Object o) | Right f <- parseEither (.: "format") o, f == formatName -> do
-    number' <- field o "version"
-    when (number' /= toInteger formatVersion) $
-      if number' < 1 then Left (damaged "version: allowed: 1") else Left (OtherVersion number')
+    version <- field o "version"
+    when (version /= toInteger formatVersion) $
+      if version < 1 then Left (damaged "version: allowed: 1") else Left (OtherVersion version)
     zero <- field o "zero"
     maybe
       (Left (damaged "zero: allowed: a time such as \"2026-01-31T12:00:00Z\""))

@@ -70,21 +70,21 @@ data Interruptions = Interruptions
 -- | The summary of a recording.
 --
 -- >>> let survey n t = Ended (Span n Top Named "survey" 0 Nothing) t Succeeded
--- >>> let [(where', t)] = summaryTimes (summary (recording [survey 1 2, survey 2 3, survey 3 7]))
--- >>> (where', timesRuns t, timesTotal t, timesMedian t, timesLongest t, timesOutcomes t)
+-- >>> let [(path, t)] = summaryTimes (summary (recording [survey 1 2, survey 2 3, survey 3 7]))
+-- >>> (path, timesRuns t, timesTotal t, timesMedian t, timesLongest t, timesOutcomes t)
 -- (pathOf ["survey"],3,12.0,3.0,7.0,[("succeeded",3)])
 --
 -- @since 0.1.0.0
 summary :: Recording -> Summary
 summary r =
   Summary
-    { summaryTimes = sortOn (Down . timesTotal . snd) [(where', timesOf found) | (where', found) <- byPath]
+    { summaryTimes = sortOn (Down . timesTotal . snd) [(path, timesOf found) | (path, found) <- byPath]
     , summaryInterruptions = sortOn (\(signal, i) -> (Down (interruptionsCount i), signal)) (Map.toList (bySignal r))
     , summaryFailures =
         sortOn
           (\(_, _, n) -> Down n)
-          [ (where', what, n)
-          | (where', found) <- byPath
+          [ (path, what, n)
+          | (path, found) <- byPath
           , (what, n) <- counted [outcomeText end | (_, end@(Just how)) <- found, isFailure how]
           ]
     , summaryLost = recordingLost r
@@ -186,13 +186,13 @@ renderSummary s =
     | null rows = [title ++ ": none"]
     | otherwise = title : columns numbers headings row rows
   timesHeadings = ["runs", "total [s]", "median [s]", "longest [s]", "outcomes", "path"]
-  timesRow (where', t) =
+  timesRow (path, t) =
     [ show (timesRuns t)
     , millisecondsText (timesTotal t)
     , millisecondsText (timesMedian t)
     , millisecondsText (timesLongest t)
     , intercalate ", " [what ++ " " ++ percent n (timesRuns t) | (what, n) <- timesOutcomes t]
-    , renderPath where'
+    , renderPath path
     ]
   percent n m = show (round (100 * fromIntegral n / fromIntegral m :: Double) :: Int) ++ " %"
   interruptionRow (signal, i) =
@@ -200,4 +200,4 @@ renderSummary s =
     , millisecondsText (interruptionsTook i)
     , if null signal then "a signal without a name" else nameText signal
     ]
-  failureRow (where', what, n) = [show n, renderPath where' ++ ": " ++ what]
+  failureRow (path, what, n) = [show n, renderPath path ++ ": " ++ what]

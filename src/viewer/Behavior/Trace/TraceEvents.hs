@@ -52,11 +52,11 @@ renderTraceEvents r =
   lanes = Set.toList (Set.fromList (map lane spans))
 
 -- A span in its lane. Its times are whole nanoseconds since the beginning of the recording.
-data Placed = Placed
+data Slice = Slice
   { lane :: !Int
   , begins :: !Integer
   , ends :: !Integer
-  , placedNode :: Node
+  , sliceNode :: Node
   , laidIn :: !(Maybe Int)
   -- The number of the innermost span that it is in, in its lane.
   , stoppedInside :: !Bool
@@ -81,7 +81,7 @@ isIn n m = position m < position n && position n <= lastInside m
 
 -- All spans in their lanes, in the order in which they begin. A span is in the lane of its parent,
 -- unless a sibling is there at that time or the span lasts longer than its parent.
-placed :: Recording -> [Placed]
+placed :: Recording -> [Slice]
 placed r = reverse (placedSpans (foldl' place (Lanes 0 IntMap.empty Set.empty IntMap.empty []) ordered))
  where
   -- Of those that begin at the same time, a span comes before those in it.
@@ -101,7 +101,7 @@ data Lanes = Lanes
   , open :: !(IntMap [Nested])
   , freeAt :: !(Set.Set (Integer, Int))
   , laneOf :: !(IntMap Int)
-  , placedSpans :: [Placed]
+  , placedSpans :: [Slice]
   }
 
 place :: Lanes -> Nested -> Lanes
@@ -111,7 +111,7 @@ place lanes n =
     , open = IntMap.insert chosen (n : enclosing) known
     , freeAt = if null enclosing then Set.insert (end, chosen) (forget (freeAt lanes)) else freeAt lanes
     , laneOf = IntMap.insert (numberOf n) chosen (laneOf lanes)
-    , placedSpans = Placed chosen begin end (nested n) (numberOf <$> listToMaybe enclosing) inside : placedSpans lanes
+    , placedSpans = Slice chosen begin end (nested n) (numberOf <$> listToMaybe enclosing) inside : placedSpans lanes
     }
  where
   (begin, end) = interval n
@@ -139,18 +139,18 @@ place lanes n =
     _ -> id
 
 -- | The same spans with times that tell which is in which: in each lane, no two times are equal.
-apart :: [Placed] -> [Placed]
+apart :: [Slice] -> [Slice]
 apart spans = sortOn begins (concatMap (go (-1) []) (IntMap.fromListWith (++) [(lane p, [p]) | p <- reverse spans]))
  where
   -- After the time of what was last, and inside of those that have begun and not ended.
-  go time outer (p : rest) | laidIn p == fmap number' (listToMaybe outer) = go begin (p {begins = begin} : outer) rest
+  go time outer (p : rest) | laidIn p == fmap numberOf (listToMaybe outer) = go begin (p {begins = begin} : outer) rest
    where
     begin = max (time + 1) (begins p)
   go time (p : outer) rest = p {ends = end} : go end outer rest
    where
     end = max (time + 1) (ends p)
   go _ [] _ = []
-  number' = spanNumber . nodeSpan . placedNode
+  numberOf = spanNumber . nodeSpan . sliceNode
 
 stoppedBy :: Node -> Maybe Int
 stoppedBy n = case nodeEnd n of
@@ -175,7 +175,7 @@ laneName l =
     pair "ph" (text "M") <> pair "pid" (int 1) <> pair "tid" (int l) <> pair "name" (text "thread_name")
       <> pair "args" (pairs (pair "name" (text ("lane " ++ show l))))
 
-complete :: Placed -> Encoding
+complete :: Slice -> Encoding
 complete p =
   pairs $
     pair "ph" (text "X")
@@ -183,15 +183,15 @@ complete p =
       <> pair "tid" (int (lane p))
       <> pair "ts" (microseconds (begins p))
       <> pair "dur" (microseconds (ends p - begins p))
-      <> pair "name" (text (nameText (spanName (nodeSpan (placedNode p)))))
-      <> pair "cat" (text (kind (spanKind (nodeSpan (placedNode p))) ++ "," ++ outcomeName (endOf p)))
+      <> pair "name" (text (nameText (spanName (nodeSpan (sliceNode p)))))
+      <> pair "cat" (text (kind (spanKind (nodeSpan (sliceNode p))) ++ "," ++ outcomeName (endOf p)))
  where
   kind Named = "named"
   kind Operator = "operator"
   kind Branch = "branch"
 
 -- In the span, just before its end: at its end, what follows hides the event.
-why :: Placed -> [Encoding]
+why :: Slice -> [Encoding]
 why p =
   [ pairs $
       pair "ph" (text "i")
@@ -205,12 +205,12 @@ why p =
   , reason /= outcomeName (endOf p)
   ]
 
-endOf :: Placed -> Maybe End
-endOf = fmap snd . nodeEnd . placedNode
+endOf :: Slice -> Maybe End
+endOf = fmap snd . nodeEnd . sliceNode
 
 -- A flow needs both of its ends, each in a span, and the first one earlier. Of the spans that a
 -- reaction stopped, the outermost one is meant.
-flows :: Recording -> [Placed] -> [Encoding]
+flows :: Recording -> [Slice] -> [Encoding]
 flows r spans = concat (zipWith flow [1 ..] interruptions)
  where
   interruptions =
@@ -222,11 +222,11 @@ flows r spans = concat (zipWith flow [1 ..] interruptions)
     , at <= begins started
     ]
   startedBy =
-    IntMap.fromListWith (++) [(n, [p]) | p <- reverse spans, Just n <- [spanReaction (nodeSpan (placedNode p))]]
+    IntMap.fromListWith (++) [(n, [p]) | p <- reverse spans, Just n <- [spanReaction (nodeSpan (sliceNode p))]]
   stoppedFirst =
     IntMap.fromListWith
       (\_ first -> first)
-      [(n, p) | p <- spans, not (stoppedInside p), Just n <- [stoppedBy (placedNode p)]]
+      [(n, p) | p <- spans, not (stoppedInside p), Just n <- [stoppedBy (sliceNode p)]]
   -- When the operator decided. A viewer looks for the span in which the flow begins; at its very end
   -- it finds none, and just before that the instant event.
   leaves n p = max (begins p) (min (ends p - 2) (IntMap.findWithDefault (ends p) n decided))
@@ -235,7 +235,7 @@ flows r spans = concat (zipWith flow [1 ..] interruptions)
       [ (reactionNumber x, nanoseconds (reactionTime x) - nanoseconds (recordingFrom r))
       | x <- recordingReactions r
       ]
-  flow :: Int -> (Int, Placed, Placed, Integer) -> [Encoding]
+  flow :: Int -> (Int, Slice, Slice, Integer) -> [Encoding]
   flow n (_, stopped, started, at) =
     [ pairs (pair "ph" (text "s") <> common n (lane stopped) at)
     , pairs (pair "ph" (text "f") <> pair "bp" (text "e") <> common n (lane started) (begins started))

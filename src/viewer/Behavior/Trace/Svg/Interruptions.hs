@@ -3,7 +3,7 @@
 -- |
 -- The interruptions of a timeline: a marker for each change of a signal, and its arrows.
 module Behavior.Trace.Svg.Interruptions
-  ( Interruptions
+  ( InterruptionLayout
   , layInterruptions
   , interruptionsAbove
   , aboveBars
@@ -34,7 +34,7 @@ import Behavior.Trace.Svg.Layout
 import Behavior.Trace.Svg.Rows
 
 -- | Where the interruptions are drawn.
-data Interruptions = Interruptions
+data InterruptionLayout = InterruptionLayout
   { interruptionsAbove :: IntMap.IntMap Double
   -- ^ How much room they need above the lanes that have some ('aboveBars' is not counted).
   , interruptionArrows :: Element
@@ -63,9 +63,9 @@ layInterruptions
   -> [Placed]
   -> [(Int, (Double, Double))]
   -> Recording
-  -> Interruptions
+  -> InterruptionLayout
 layInterruptions left right (barHeight, gap) x y placed pauses recorded =
-  Interruptions
+  InterruptionLayout
     { interruptionsAbove = IntMap.map ((rowHeight *) . fromIntegral . rowCount) byLane
     , interruptionArrows = group (if isThin then "thin" else "") (concatMap arrows labelled)
     , interruptionLabels = group "il" (concatMap label labelled)

@@ -3,7 +3,7 @@
 -- |
 -- The texts of the bars of a timeline.
 module Behavior.Trace.Svg.Labels
-  ( Label (..)
+  ( BarLabel (..)
   , labels
   ) where
 
@@ -22,7 +22,7 @@ import Behavior.Trace.Svg.Outcome
 
 -- | A text of a bar: in which lane, how many of its lines are below the bar, between which pixels, and what to draw,
 -- given the upper edge of the bar.
-data Label = Label
+data BarLabel = BarLabel
   { labelLane :: !Int
   , labelLinesBelow :: !Int
   , labelFrom :: !Double
@@ -34,14 +34,14 @@ data Label = Label
 -- line to the bar; or cut off. Below it the text of its failure or fault, if there is room for that (and it is
 -- wanted), but not over what is there in that lane already. Nothing is further right than the given pixel.
 -- The bars have that height.
-labels :: Bool -> Double -> Double -> [(Int, (Double, Double))] -> [Mark] -> [Label]
+labels :: Bool -> Double -> Double -> [(Int, (Double, Double))] -> [Mark] -> [BarLabel]
 labels notes right h taken = go (-1) 0 0
  where
   go _ _ _ [] = []
   -- The last text in this lane ends at `used`, the last one below its bars at `noted`.
   go lane used noted (m : later)
     | markLane m /= lane = go (markLane m) 0 0 (m : later)
-    | otherwise = [Label lane 0 a b drawn | (a, b, drawn) <- found] ++ note ++ go lane used' noted' later
+    | otherwise = [BarLabel lane 0 a b drawn | (a, b, drawn) <- found] ++ note ++ go lane used' noted' later
    where
     sameLane = takeWhile ((== lane) . markLane) later
     (found, used', complete) = name right h used m (maybe right markLeft (listToMaybe sameLane))
@@ -69,7 +69,7 @@ labels notes right h taken = go (-1) 0 0
    where
     inFull = notedLines (room furthest) (text True)
     noteAt x texts =
-      ( [ Label
+      ( [ BarLabel
             (markLane m)
             (length texts)
             x

@@ -19,7 +19,7 @@ import Data.Maybe (mapMaybe)
 
 import Behavior.Time (Seconds)
 import Behavior.Trace
-import Behavior.Trace.Describe
+import Behavior.Trace.Terminal.Clip
 
 -- | What is known after some events.
 --
@@ -95,7 +95,17 @@ data Stopped = Stopped
 --
 -- @since 0.1.0.0
 nothingYet :: Live
-nothingYet = Live IntMap.empty [] 0 [] Nothing IntMap.empty 0 Nothing
+nothingYet =
+  Live
+    { liveActive = IntMap.empty
+    , liveDone = []
+    , liveDoneCount = 0
+    , liveFailed = []
+    , liveInterruption = Nothing
+    , liveStopped = IntMap.empty
+    , liveLost = 0
+    , liveTime = Nothing
+    }
 
 -- The greatest numbers of what is kept.
 maxDone, maxInside, maxFailed, maxActive, maxPath, maxReactions, maxStopped :: Int
@@ -230,55 +240,3 @@ few active
  where
   known = IntMap.toAscList active
   half = maxActive `div` 2
-
--- The first ones, evaluated: so that what is forgotten is not kept in memory.
-keep :: Int -> [a] -> [a]
-keep n values = foldr seq kept kept
- where
-  kept = take n values
-
-clip :: String -> String
-clip text = keep 200 (inertUpTo 200 text)
-
-clipSpan :: Span -> Span
-clipSpan s = name `seq` s {spanName = name}
- where
-  name = clip (spanName s)
-
-clipEnd :: End -> End
-clipEnd end = case end of
-  Succeeded -> end
-  FailedWith why -> FailedWith $! clip why
-  FaultedWith why -> FaultedWith $! clip why
-  StoppedBy cause -> StoppedBy $! case cause of
-    SignalChanged n changes -> SignalChanged n $! keep 8 (map clipChange changes)
-    SiblingFinished name -> SiblingFinished $! clip name
-    SiblingFailed name -> SiblingFailed $! clip name
-    TimeLimit _ -> cause
-    FromOutside why -> FromOutside $! clip why
-    WasAbandoned -> cause
-
-clipChange :: Change -> Change
-clipChange (Change signal before after) = name `seq` after' `seq` Change name before' after'
- where
-  name = clip signal
-  after' = clip after
-  before' = case before of
-    Nothing -> Nothing
-    Just b -> Just $! clip b
-
-clipReaction :: Reaction -> Reaction
-clipReaction r =
-  operator `seq` changes `seq` starts `seq`
-    r {reactionOperator = operator, reactionChanges = changes, reactionStopped = stopped, reactionStarts = starts}
- where
-  operator = clip (reactionOperator r)
-  changes = keep 8 (map clipChange (reactionChanges r))
-  starts = case reactionStarts r of
-    Nothing -> Nothing
-    Just name -> Just $! clip name
-  stopped = case reactionStopped r of
-    Nothing -> Nothing
-    Just b
-      | name <- clip (stoppedName b) ->
-          Just $! (name `seq` b {stoppedName = name, stoppedEnd = clipEnd (stoppedEnd b)})
