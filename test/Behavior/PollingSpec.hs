@@ -301,6 +301,16 @@ recovering = do
       awaitEnd caller `shouldReturn` Gave ()
     notes (history s) `shouldReturn` ["task", "recovery", "the reading ends", "task"]
 
+  it "after a recovery the task begins only when a slow reading has ended" $ do
+    begun <- newLog
+    alarm <- newTVarIO False
+    level <- newSensor $ \n -> when (n == 2) (uninterruptibleMask_ (sleep 5))
+    let signal = const <$> watchedVar alarm <*> Signal.polling 1 (sensor level)
+        task = now >>= note begun >> length <$> notes begun >>= \n -> unless (n == 2) hang
+        raised = sleep 2 >> atomically (writeTVar alarm True) >> hang
+    _ <- simulate (Signal.monitor signal (atomically (writeTVar alarm False)) task ||| raised)
+    notes begun `shouldReturn` [0, 6]
+
   it "a recovery that comes before any task does not wait for a slow reading either" $ do
     entries <- newLog
     low <- newTVarIO Nothing
