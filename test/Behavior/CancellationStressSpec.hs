@@ -10,21 +10,23 @@
 module Behavior.CancellationStressSpec (spec) where
 
 import Control.Concurrent
-import Control.Concurrent.Async (asyncThreadId)
+import Control.Concurrent.Async (asyncThreadId, wait, withAsync)
 import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar)
 import Control.Exception
-import Control.Monad (replicateM_, void)
-import Data.Foldable (for_, traverse_)
+import Control.Monad (replicateM_)
+import Data.Foldable (for_, toList)
 import Data.IORef
 import Test.Hspec hiding (parallel)
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
 import Behavior.Internal.Runtime (Label (..))
-import Behavior.Parallel (allOf, firstOf, fork, requestStop, scoped)
+import Behavior.Message (Inbox, withInbox)
+import Behavior.Parallel (pinned, unpinned)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior.Trace (adopt)
+import Language.Operator
 import Places
 import Support
 
@@ -46,8 +48,10 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
       ioProperty $ do
         inside <- newIORef (0 :: Int)
         input <- newTVarIO (0 :: Int)
-        let change = atomically (modifyTVar' input (+ 1))
-        end <- cancellingAtWith change moments (leavingNothing (grow inside input tree))
+        driver <- newIORef (\() -> pure ())
+        let change = atomically (modifyTVar' input (+ 1)) >> readIORef driver >>= ($ ())
+            withMessages = withInbox 2 (\deliver -> pure () <$ writeIORef driver deliver)
+        end <- cancellingAtWith change moments (leavingNothing (withMessages (\box -> grow inside input box tree)))
         left <- readIORef inside
         pure (tabulate "it ended" [kindOf end] (left === 0))
 
@@ -190,64 +194,59 @@ kindOf = \case
   CancelledBy _ -> "cancelled"
   CancelledWithFault _ _ -> "cancelled, with a fault"
 
+-- | On real threads, and so with what the simulator does not have.
 data Tree
   = Bottom Leaf
-  | Orelse Tree Tree
-  | Times Int Tree
-  | Race Tree Tree
-  | Gather Tree Tree
-  | Races [Tree]
-  | Gathers [Tree]
-  | Forking Tree [Tree]
-  | -- | The stops of the children are requested before the last tree runs.
-    Retracting Tree [Tree] Tree
-  | Within Double Tree
-  | Select Tree Tree
-  | Guard Tree Tree
-  | Switching Tree Tree
+  | Pinned Tree
+  | Unpinned Tree
+  | -- | In a thread that the library has not started; it has the caller's place in a trace.
+    Adopted Tree
+  | Op (Operator Sensed Tree)
+  deriving (Show)
+
+-- | Whether it can be divided by this number; or the nearest shared signal.
+data Sensed = DividedBy Int | Nearest
   deriving (Show)
 
 instance Arbitrary Tree where
-  arbitrary = sized (tree . min 12)
+  arbitrary = sized (tree outside . min 4)
    where
-    tree n
-      | n <= 1 = Bottom <$> arbitrary
+    tree :: Around -> Int -> Gen Tree
+    tree place n
+      | n <= 0 = Bottom <$> arbitrary
       | otherwise =
-          oneof
-            [ Orelse <$> half <*> half
-            , Times <$> choose (1, 3) <*> tree (n - 1)
-            , Race <$> half <*> half
-            , Gather <$> half <*> half
-            , Races <$> several
-            , Gathers <$> several
-            , Forking <$> half <*> several
-            , Retracting <$> half <*> several <*> half
-            , Within <$> elements [0, 0.0001, 3600] <*> tree (n - 1)
-            , Select <$> half <*> half
-            , Guard <$> half <*> half
-            , Switching <$> half <*> half
+          frequency
+            [ (4, tree place 0)
+            , (1, Pinned <$> tree place (n - 1))
+            , (1, Unpinned <$> tree place (n - 1))
+            , (1, Adopted <$> tree place (n - 1))
+            , (30, Op <$> operators (not . abandons) place sensed (\inner -> tree inner (n - 1)))
             ]
-     where
-      half = tree (n `div` 2)
-      several = choose (1, 3) >>= \k -> vectorOf k (tree (n `div` 3))
+    sensed place = frequency ([(3, DividedBy <$> choose (1, 3))] ++ [(3, pure Nearest) | sharing place])
+  shrink = \case
+    Bottom _ -> []
+    Pinned a -> [a]
+    Unpinned a -> [a]
+    Adopted a -> [a]
+    Op o -> toList o ++ (Op <$> shrinkOperator (const []) shrink o)
 
-grow :: IORef Int -> TVar Int -> Tree -> IO ()
-grow inside input = go
+-- | Each message is delivered when the input changes.
+grow :: IORef Int -> TVar Int -> Inbox () -> Tree -> IO ()
+grow inside input box = runPart stress (environmentWith box) ()
  where
-  go = \case
-    Bottom leaf -> perform inside leaf
-    Orelse a b -> go a ? go b
-    Times n a -> attempt n (go a)
-    Race a b -> go a ||| go b
-    Gather a b -> both (go a) (go b)
-    Races as -> firstOf (map go as)
-    Gathers as -> void (allOf (map go as))
-    Forking a as -> scoped (\nursery -> for_ as (fork nursery . go) >> go a)
-    Retracting a as b -> scoped $ \nursery -> do
-      children <- traverse (fork nursery . go) as
-      go a >> traverse_ requestStop children >> go b
-    Within s a -> timeout (realToFrac s) (go a)
-    Select a b -> Signal.rSelect ((== 0) . (`mod` 2) <$> inputSignal) (go a) (go b)
-    Guard a b -> Signal.monitor ((== 0) . (`mod` 3) <$> inputSignal) (go a) (go b)
-    Switching a b -> Signal.switch inputSignal (\n -> if even n then go a else go b)
-  inputSignal = Signal.watching (readTVar input)
+  stress =
+    Language
+      { runPart = \outer _ -> \case
+          Bottom leaf -> perform inside leaf
+          Pinned a -> pinned (runPart stress outer () a)
+          Unpinned a -> unpinned (runPart stress outer () a)
+          Adopted a -> adopt >>= \here -> withAsync (here (runPart stress outer () a)) wait
+          Op o -> run stress outer () () o
+      , inBranch = \_ _ -> ()
+      , signalOf = \outer _ -> \case
+          DividedBy n -> fromEnum . (== 0) . (`mod` n) <$> Signal.watching (readTVar input)
+          Nearest -> nearest outer
+      , reactsTo = id
+      , tick = 0.0001
+      , results = const ()
+      }
