@@ -222,7 +222,7 @@ instance Arbitrary Tree where
             , (1, Adopted <$> tree place (n - 1))
             , (30, Op <$> operators (not . abandons) place sensed (\inner -> tree inner (n - 1)))
             ]
-    sensed place = frequency ([(3, DividedBy <$> choose (1, 3))] ++ [(3, pure Nearest) | sharing place])
+    sensed place = frequency ((3, DividedBy <$> choose (1, 3)) : [(3, pure Nearest) | sharing place])
   shrink = \case
     Bottom _ -> []
     Pinned a -> [a]

@@ -38,6 +38,7 @@ module Language.Operator
   , Language (..)
   , Environment (..)
   , environmentWith
+  , noEnvironment
   , run
   , holds
   ) where
@@ -326,7 +327,7 @@ data Environment at a = Environment
   , inbox :: Inbox ()
   }
 
--- | What a whole program gets.
+-- | What a whole program gets that has an inbox, or none.
 environmentWith :: Inbox () -> Environment at a
 environmentWith box =
   Environment
@@ -334,6 +335,9 @@ environmentWith box =
     , nearest = pure 0
     , inbox = box
     }
+
+noEnvironment :: Environment at a
+noEnvironment = environmentWith (error "a program without messages has no inbox")
 
 -- | Runs the operator. Its first position is that of what runs in its own thread; the second is its own.
 run :: Language at s p a -> Environment at a -> at -> at -> Operator s p -> Behavior a

@@ -30,8 +30,8 @@ import Data.Set (Set)
 import qualified Data.Set as Set
 
 import Behavior.Sim
+import Language.Primitive
 import Reality.Generate
-import Reality.Program
 import Reality.Stage
 import Support (within)
 

@@ -12,10 +12,11 @@ import Data.IORef
 import qualified Data.Set as Set
 import Test.Hspec
 
+import Language.Operator (Operator (Parallel, Then))
+import Language.Primitive
 import Reality.Broken
 import Reality.Compare
 import Reality.Fixed
-import Reality.Program
 import Reality.Stage
 import Support
 
@@ -66,7 +67,7 @@ specWith effort = do
       it "can be stopped, in reality and in the simulation" $ do
         outcomes <- inReality (seed effort) 1000 woken
         Just (_, right) <- explored id 10000 woken
-        right `shouldBe` Set.fromList [": Gave 'p'", "a: Gave 'p'"]
+        right `shouldBe` Set.fromList [": Gave '-'", "a: Gave '-'"]
         Set.difference outcomes right `shouldBe` Set.empty
   describe "A simulator that raises exceptions too late is detected" . around_ (within 60 . leavingNothing) $ do
     it "by an outcome that GHC determines" $ do
@@ -82,8 +83,8 @@ specWith effort = do
 
 -- | The second branch receives its stop request at an unmask inside of onException.
 raisedInside :: Program
-raisedInside = Parallel (Note 'a') (OnException (Uninterruptible (Note 'b')) (Note 'c'))
+raisedInside = Op (Parallel (Note 'a') (OnException (Uninterruptible (Note 'b')) (Note 'c')))
 
 -- | The second branch is blocked in a transaction when the first opens the gate and ends.
 woken :: Program
-woken = Parallel (Then (Await 1) (Open 0)) (Masked (Then (Open 1) (Then (Await 0) (Note 'a'))))
+woken = Op (Parallel (Op (Then (Pass 1) (Open 0))) (Masked (Op (Then (Open 1) (Op (Then (Pass 0) (Note 'a')))))))

@@ -43,7 +43,11 @@ someProgram :: (Operator () () -> Bool) -> Int -> Gen Program
 someProgram wanted deep = withNames <$> programs wanted deep
 
 callers :: Gen Caller
-callers = frequency [(3, pure Program.Operator), (1, PlainThread <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))]
+callers =
+  frequency
+    [ (3, pure Program.Operator)
+    , (1, PlainThread <$> elements [Asynchronous, Synchronous] <*> choose (0, 3))
+    ]
 
 inOrder :: [Change] -> [Change]
 inOrder = sortOn (\(Change at _ _) -> at)

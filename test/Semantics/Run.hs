@@ -52,7 +52,7 @@ import Behavior.Sim
   , simulateWith
   )
 import qualified Behavior.Sim as Sim
-import Language.Operator (Environment (..), Language (..), environmentWith, run)
+import Language.Operator (Environment (..), Language (..), environmentWith, noEnvironment, run)
 import Language.Perform
 import Semantics.Path (End (..), Seen (..))
 import Semantics.Program
@@ -155,9 +155,9 @@ data Context = Context
 -- | The world's program and environment. The given action receives each transition; it must
 -- not be a scheduling point.
 behavior :: Instrument position -> (Transition -> IO ()) -> World -> Behavior Value
-behavior instrument emit world = withMessages $ \delivers box -> do
+behavior instrument emit world = withMessages $ \delivers whole -> do
   context <- Context <$> traverse newTVarIO (Map.fromList (conditions world)) <*> newIORef Map.empty <*> pure delivers
-  let running within = runPart (language instrument emit context) (environmentWith box) within (program world)
+  let running within = runPart (language instrument emit context) whole within (program world)
   case caller world of
     Operator -> aroundPart instrument (root instrument) (FirstOf [program world]) $ \_ within ->
       firstOf [running (branchOf instrument "firstOf: 1" within), timeIsUp <$ environment context]
@@ -185,8 +185,8 @@ behavior instrument emit world = withMessages $ \delivers box -> do
     | usesMessages (program world) = do
         driver <- newIORef (\() -> pure ())
         withInbox roomForMessages (\delivers -> pure () <$ writeIORef driver delivers) $
-          act (readIORef driver >>= \delivers -> delivers ())
-    | otherwise = act (pure ()) (error "a program without messages has no inbox")
+          act (readIORef driver >>= \delivers -> delivers ()) . environmentWith
+    | otherwise = act (pure ()) noEnvironment
 
 -- | How the parts of a program run.
 language :: Instrument position -> (Transition -> IO ()) -> Context -> Language position Signal Program Value

@@ -1,22 +1,23 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- Small programs of gates, transactions and operators, without durations.
-module Reality.Program
+-- Small programs whose leaves are gates, transactions, masks and handlers, without durations: for the comparison with
+-- real threads.
+module Language.Primitive
   ( Program (..)
   , size
+  , lettered
   , observed
   ) where
 
 import Control.Concurrent.STM (STM, TVar, check, modifyTVar', newTVarIO, readTVar, readTVarIO, writeTVar)
 import Control.Exception
-import Control.Monad (replicateM, void)
+import Control.Monad (replicateM)
 
-import Behavior (Behavior, (?))
-import Behavior.Internal.Runtime (atomically, checkpoint)
-import Behavior.Parallel (allOf, await, both, firstOf, fork, parallel, scoped)
-import Behavior.Signal (Signal, watching)
-import qualified Behavior.Signal as Signal
+import Behavior.Internal.Runtime (checkpoint)
+import Behavior.STM (atomically)
+import Behavior.Signal (watching)
+import Language.Operator
 import Support (Failure (..), Fault (..), ending)
 
 -- | A program returns a letter. A gate is also a condition, which holds while it is open.
@@ -25,47 +26,28 @@ data Program
     Note Char
   | Open Int
   | Close Int
-  | Await Int
+  | -- | Blocks until the gate is open.
+    Pass Int
   | Fails Char
   | Faults Char
   | -- | A pending exception is raised here, if masked.
     Allow
-  | Then Program Program
-  | Else Program Program
   | Masked Program
   | Uninterruptible Program
   | Finally Program Program
   | OnException Program Program
-  | Parallel Program Program
-  | Both Program Program
-  | FirstOf [Program]
-  | AllOf [Program]
-  | -- | The first is forked; the body runs the second, awaits the first, and runs the third.
-    Forking Program Program Program
-  | RSelect Int Program Program
-  | Switch Int Program Program
-  | Monitor Int Program Program
-  | WhileHolding Int Program
+  | -- | Its conditions are gates.
+    Op (Operator Int Program)
   deriving (Eq, Show)
 
 -- | The approximate number of operations.
 size :: Program -> Int
 size = \case
-  Then p q -> size p + size q
-  Else p q -> size p + size q
   Masked p -> 2 + size p
   Uninterruptible p -> 2 + size p
   Finally p q -> 3 + size p + size q
   OnException p q -> 3 + size p + size q
-  Parallel p q -> 4 + size p + size q
-  Both p q -> 4 + size p + size q
-  FirstOf ps -> 2 + sum (map ((+ 1) . size) ps)
-  AllOf ps -> 2 + sum (map ((+ 1) . size) ps)
-  Forking p q r -> 6 + sum (map size [p, q, r])
-  RSelect _ p q -> 4 + size p + size q
-  Switch _ p q -> 4 + size p + size q
-  Monitor _ p q -> 4 + size p + size q
-  WhileHolding _ p -> 4 + size p
+  Op o -> maybe 0 (const 4) (operatorName o) + (if forks o then 2 else 0) + sum (fmap size o)
   _ -> 1
 
 -- | Whether its last operation is an unmask (if its caller is not masked). In reality an
@@ -76,9 +58,25 @@ unmasksLast = \case
   Uninterruptible _ -> True
   Finally _ _ -> True
   OnException p _ -> unmasksLast p
-  Then _ q -> unmasksLast q
-  Else p q -> unmasksLast p && unmasksLast q
+  Op (Then _ q) -> unmasksLast q
+  Op (Else p q) -> unmasksLast p && unmasksLast q
   _ -> False
+
+-- | Gives every part its own letter.
+lettered :: Program -> Program
+lettered = numbered . go
+ where
+  go = \case
+    Note _ -> letter Note
+    Fails _ -> letter Fails
+    Faults _ -> letter Faults
+    Masked p -> Masked <$> go p
+    Uninterruptible p -> Uninterruptible <$> go p
+    Finally p q -> Finally <$> go p <*> go q
+    OnException p q -> OnException <$> go p <*> go q
+    Op o -> Op <$> traverse go o
+    other -> pure other
+  letter make = Numbered (\n -> (n + 1, make (toEnum (fromEnum 'a' + n - 1))))
 
 -- | Two gates, which are shut at first, and the log.
 data World = World
@@ -91,49 +89,43 @@ data World = World
 observed :: IO () -> Program -> IO String
 observed jitter program = do
   world <- World <$> replicateM 2 (newTVarIO False) <*> newTVarIO ""
-  end <- ending (run jitter world program)
+  end <- ending (runPart (language jitter world) noEnvironment () program)
   line <- readTVarIO (logged world)
   pure (reverse line ++ ": " ++ show end)
 
 -- | A simulated run has a scheduling point before each operation. There is one more before each
 -- change of the masking state or of the handlers, so that exceptions cannot arrive in reality
 -- where they cannot arrive in a simulation.
-run :: IO () -> World -> Program -> Behavior Char
-run jitter world = go
+language :: IO () -> World -> Language () Int Program Char
+language jitter world = this
  where
-  go = \case
+  this =
+    Language
+      { runPart = \around () -> go around
+      , inBranch = \_ () -> ()
+      , signalOf = \_ () g -> fromEnum <$> watching (readTVar (gate g))
+      , reactsTo = id
+      , tick = 1
+      , results = maybe '-' (last . ('a' :))
+      }
+  go around = \case
     Note c -> c <$ does (modifyTVar' (logged world) (c :))
     Open g -> 'o' <$ does (writeTVar (gate g) True)
     Close g -> 'c' <$ does (writeTVar (gate g) False)
-    Await g -> 'w' <$ does (readTVar (gate g) >>= check)
+    Pass g -> 'w' <$ does (readTVar (gate g) >>= check)
     Fails c -> edge >> throwIO (Failure [c])
     Faults c -> edge >> throwIO (Fault [c])
     Allow -> 'i' <$ (edge >> allowInterrupt)
-    Then p q -> go p >> go q
-    Else p q -> go p ? go q
     Masked p -> edge >> mask_ (inner p)
     Uninterruptible p -> edge >> uninterruptibleMask_ (inner p)
     Finally p q -> edge >> inner p `finally` inner q
     OnException p q -> edge >> inner p `onException` inner q
-    Parallel p q -> 'p' <$ parallel (go p) (go q)
-    Both p q -> 'b' <$ both (go p) (go q)
-    FirstOf ps -> firstOf (map go ps)
-    AllOf ps -> last . ('a' :) <$> allOf (map go ps)
-    Forking p q r -> scoped $ \nursery -> do
-      result <- fork nursery (go p)
-      void (go q)
-      c <- atomically (await result)
-      c <$ go r
-    RSelect g p q -> Signal.rSelect (condition g) (go p) (go q)
-    Switch g p q -> Signal.switch (condition g) (\holds -> if holds then go p else go q)
-    Monitor g p q -> Signal.monitor (condition g) (void (go p)) (go q)
-    WhileHolding g p -> Signal.whileHolding (condition g) (go p)
-  inner p
-    | unmasksLast p = go p
-    | otherwise = go p <* edge
+    Op o -> run this around () () o
+   where
+    inner p
+      | unmasksLast p = go around p
+      | otherwise = go around p <* edge
   edge = jitter >> checkpoint
   does :: STM () -> IO ()
   does transaction = jitter >> atomically transaction >> jitter
   gate g = gates world !! g
-  condition :: Int -> Signal Bool
-  condition g = watching (readTVar (gate g))
