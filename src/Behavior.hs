@@ -161,9 +161,9 @@ module Behavior
   , StoppedWithFault (..)
   ) where
 
-import Behavior.Internal.Failure
-import Behavior.Internal.Parallel
-import Behavior.Internal.Program
+import Behavior.Internal.Concurrent.Parallel
+import Behavior.Internal.Concurrent.Resumable
+import Behavior.Internal.Core.Failure
+import Behavior.Internal.Program.RunBehavior
 import Behavior.Internal.Reactive.Polled
-import Behavior.Internal.Resumable
-import Behavior.Internal.Runtime
+import Behavior.Internal.Seam.Runtime

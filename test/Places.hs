@@ -17,7 +17,7 @@ import Data.Foldable (traverse_)
 import Data.Maybe (listToMaybe)
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..))
+import Behavior.Internal.Seam.Runtime (Label (..))
 import Behavior.Message (handleNext, messageRule, onMessage, withInbox)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, pinned, scoped, unpinned)
 import Behavior.STM (atomically, withTSem)

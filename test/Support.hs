@@ -85,9 +85,9 @@ import Behavior
   , behaviorFailedFromException
   , behaviorFailedToException
   )
-import Behavior.Internal.Failure (BehaviorFailed (..), isCancellation)
-import Behavior.Internal.Runtime (Label (..), atomically, liveThreadCount)
-import Behavior.Internal.Trace.Place
+import Behavior.Internal.Core.Failure (BehaviorFailed (..), isCancellation)
+import Behavior.Internal.Seam.Runtime (Label (..), atomically, liveThreadCount)
+import Behavior.Internal.Spans.Place
 import Behavior.Trace (adopt)
 import qualified Behavior.Trace as Trace
 

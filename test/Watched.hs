@@ -58,7 +58,7 @@ import Data.IORef (atomicModifyIORef', newIORef, readIORef)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus, unsafeIOToSTM)
 
 import Behavior (Behavior, Seconds, failWith)
-import Behavior.Internal.Runtime (atomically)
+import Behavior.Internal.Seam.Runtime (atomically)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Support

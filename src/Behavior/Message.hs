@@ -27,4 +27,4 @@ module Behavior.Message
   , dropped
   ) where
 
-import Behavior.Internal.Inbox
+import Behavior.Internal.Reactive.Inbox

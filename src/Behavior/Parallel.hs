@@ -53,6 +53,6 @@ module Behavior.Parallel
   , ChildStopped (..)
   ) where
 
-import Behavior.Internal.Nursery
-import Behavior.Internal.Parallel
-import Behavior.Internal.Pinned
+import Behavior.Internal.Concurrent.Nursery
+import Behavior.Internal.Concurrent.Parallel
+import Behavior.Internal.Concurrent.Pinned

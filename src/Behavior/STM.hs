@@ -27,8 +27,8 @@ module Behavior.STM
 import Control.Concurrent.STM hiding (atomically, registerDelay)
 import Control.Concurrent.STM.TSem
 
-import Behavior.Internal.Runtime (atomically)
-import Behavior.Internal.Semaphore
+import Behavior.Internal.Concurrent.Semaphore
+import Behavior.Internal.Seam.Runtime (atomically)
 
 -- $setup
 -- >>> import Behavior (both)

@@ -110,7 +110,7 @@ module Behavior.Sim
   , renderSchedule
   ) where
 
-import Behavior.Internal.Runtime.Backend (Label (..))
+import Behavior.Internal.Core.Backend (Label (..))
 import Behavior.Internal.Sim.Explore
 import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Report

@@ -33,7 +33,7 @@ module Behavior.Time
   , Abandoned (..)
   ) where
 
-import Behavior.Internal.Abandoning
+import Behavior.Internal.Concurrent.Abandoning
+import Behavior.Internal.Concurrent.Repeating
 import Behavior.Internal.Reactive.Timeout
-import Behavior.Internal.Repeating
-import Behavior.Internal.Runtime
+import Behavior.Internal.Seam.Runtime

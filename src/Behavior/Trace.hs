@@ -72,8 +72,8 @@ module Behavior.Trace
   , Change (..)
   ) where
 
-import Behavior.Internal.Trace.Event hiding (traverseTexts)
-import Behavior.Internal.Trace.Sink (Sink (..), SinkProblem (..), linesTo)
-import Behavior.Internal.Trace.Span (named)
-import Behavior.Internal.Trace.Text (plainLine)
-import Behavior.Internal.Trace.Tracing
+import Behavior.Internal.Spans.Event hiding (traverseTexts)
+import Behavior.Internal.Spans.Span (named)
+import Behavior.Internal.Tracing.Sink (Sink (..), SinkProblem (..), linesTo)
+import Behavior.Internal.Tracing.Text (plainLine)
+import Behavior.Internal.Tracing.Tracing

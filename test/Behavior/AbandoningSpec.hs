@@ -17,7 +17,7 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 
 import Behavior
-import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.Internal.Seam.Runtime (liveThreadCount)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim

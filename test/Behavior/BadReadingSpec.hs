@@ -15,9 +15,9 @@ import Data.Maybe (isJust)
 import Test.Hspec
 
 import Behavior (Failed)
-import Behavior.Internal.Cause (Cause (..))
-import Behavior.Internal.Runtime (atomically, now, sleep)
-import Behavior.Internal.Scope (Verdict (..), SomeBranch (..), requestStopAsync, outcome, structured)
+import Behavior.Internal.Concurrent.Scope (Verdict (..), SomeBranch (..), requestStopAsync, outcome, structured)
+import Behavior.Internal.Core.Cause (Cause (..))
+import Behavior.Internal.Seam.Runtime (atomically, now, sleep)
 import Behavior.Internal.Signal.Source (startSensors)
 import qualified Behavior.Internal.Signal.Source as Source
 import qualified Behavior.Signal as Signal

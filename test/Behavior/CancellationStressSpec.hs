@@ -20,7 +20,7 @@ import Test.Hspec hiding (parallel)
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..))
+import Behavior.Internal.Seam.Runtime (Label (..))
 import Behavior.Message (Inbox, withInbox)
 import Behavior.Parallel (pinned, unpinned)
 import Behavior.STM (atomically)

@@ -11,7 +11,7 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..), start, threadEnd, threadId, throwToAll)
+import Behavior.Internal.Seam.Runtime (Label (..), start, threadEnd, threadId, throwToAll)
 import Behavior.STM (atomically)
 import Behavior.Sim (Run (finished), exhaustively, explore, simulate)
 import Behavior.Time

@@ -17,7 +17,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (Property, choose, forAll, ioProperty, listOf1, (===))
 
 import Behavior (Behavior, Seconds, both, sleep)
-import Behavior.Internal.Runtime (now)
+import Behavior.Internal.Seam.Runtime (now)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim

@@ -14,7 +14,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (choose, forAll, ioProperty, listOf1, (===))
 
 import Behavior (Seconds, (|||))
-import Behavior.Internal.Runtime (atomically, now, sleep)
+import Behavior.Internal.Seam.Runtime (atomically, now, sleep)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly, simulate)

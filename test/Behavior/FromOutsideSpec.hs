@@ -16,7 +16,7 @@ import System.IO.Unsafe (unsafePerformIO)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime (atomically)
+import Behavior.Internal.Seam.Runtime (atomically)
 import Behavior.Message (onMessage, withInbox)
 import Behavior.Parallel (allOf, decide, firstOf, scoped)
 import Behavior.Signal (Signal)

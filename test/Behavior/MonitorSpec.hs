@@ -15,7 +15,7 @@ import Test.Hspec.QuickCheck (modifyMaxSize, prop)
 import Test.QuickCheck (NonNegative (..), ioProperty, (===))
 
 import Behavior ((|||))
-import Behavior.Internal.Runtime (atomically, sleep)
+import Behavior.Internal.Seam.Runtime (atomically, sleep)
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (outcome), explain, simulate)

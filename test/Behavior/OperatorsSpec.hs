@@ -11,7 +11,7 @@ import Control.Monad (replicateM_, void, when)
 import Data.Foldable (for_)
 import Test.Hspec
 
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Seam.Runtime (Label (..), atomically)
 import Support
 import Watched
 

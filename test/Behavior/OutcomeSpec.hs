@@ -19,7 +19,7 @@ import GHC.Conc (unsafeIOToSTM)
 import Test.Hspec
 
 import Behavior (Behavior)
-import Behavior.Internal.Runtime (atomically)
+import Behavior.Internal.Seam.Runtime (atomically)
 import qualified Behavior.Signal as Signal
 import Support
 import Watched

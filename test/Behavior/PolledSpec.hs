@@ -16,7 +16,7 @@ import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Seam.Runtime (Label (..), atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (now, timeout)
 import Support hiding (Failure)

@@ -15,7 +15,7 @@ import Data.List (group)
 import Test.Hspec hiding (after, before)
 
 import Behavior (Behavior, Seconds, sleep, (|||))
-import Behavior.Internal.Runtime (Label (..), atomically, now)
+import Behavior.Internal.Seam.Runtime (Label (..), atomically, now)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (SimOptions (scheduled, timerSlip), Schedule (Seeded), defaultSimOptions, simulate, simulateWith)
 import Support

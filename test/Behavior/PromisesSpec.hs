@@ -13,7 +13,7 @@ import qualified System.Timeout as System
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (atomically, awaitUninterruptibly)
+import Behavior.Internal.Seam.Runtime (atomically, awaitUninterruptibly)
 import Places
 import Support
 

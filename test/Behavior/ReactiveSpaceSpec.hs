@@ -7,7 +7,7 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (replicateM_, unless)
 import Test.Hspec
 
-import Behavior.Internal.Runtime (atomically)
+import Behavior.Internal.Seam.Runtime (atomically)
 import qualified Behavior.Signal as Signal
 import Memory
 import Support

@@ -17,7 +17,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (ioProperty, (===))
 
 import Behavior (Behavior, failWith)
-import Behavior.Internal.Runtime (atomically, now, sleep)
+import Behavior.Internal.Seam.Runtime (atomically, now, sleep)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Outcome (Returned), Run (finished, outcome), simulate)

@@ -24,7 +24,7 @@ import System.Posix.Signals
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..), atomically, awaitUninterruptibly)
+import Behavior.Internal.Seam.Runtime (Label (..), atomically, awaitUninterruptibly)
 import Support
 
 spec :: Spec

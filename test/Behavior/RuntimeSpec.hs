@@ -20,11 +20,11 @@ import System.Mem (performMajorGC)
 import Test.Hspec hiding (parallel)
 
 import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
-import Behavior.Internal.Cause (Cause (..))
-import Behavior.Internal.Runtime
-import Behavior.Internal.Runtime.Property (mistakeOf, testing)
-import Behavior.Internal.Scope hiding (Outcome (..))
-import Behavior.Internal.Stop (Stop (..), causeOf)
+import Behavior.Internal.Concurrent.Scope hiding (Outcome (..))
+import Behavior.Internal.Core.Cause (Cause (..))
+import Behavior.Internal.Core.Property (mistakeOf, testing)
+import Behavior.Internal.Core.Stop (Stop (..), causeOf)
+import Behavior.Internal.Seam.Runtime
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly)
 import Support

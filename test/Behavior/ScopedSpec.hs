@@ -15,7 +15,7 @@ import Data.Traversable (for)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.Internal.Seam.Runtime (liveThreadCount)
 import Behavior.Parallel
 import Behavior.STM (atomically, check, modifyTVar', newTVarIO, readTVar, writeTVar)
 import Behavior.Sim (Outcome (Returned, Threw), Run (outcome), explain, explore, randomly)

@@ -12,7 +12,7 @@ import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck (ioProperty, (===))
 
 import Behavior (Failed (..), both, failed, (?), (|||))
-import Behavior.Internal.Runtime (Label (..), atomically)
+import Behavior.Internal.Seam.Runtime (Label (..), atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Outcome (Returned), Run (outcome), explain, explore, randomly)
 import Support

@@ -17,7 +17,7 @@ import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime (atomically)
+import Behavior.Internal.Seam.Runtime (atomically)
 import Behavior.Parallel (allOf, firstOf, scoped)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)

@@ -15,8 +15,8 @@ import Test.Hspec
 import Test.QuickCheck hiding (Failure, within)
 
 import Behavior
-import Behavior.Internal.Runtime (Label (..), sleepToSlot)
-import Behavior.Internal.Seconds (duration, period)
+import Behavior.Internal.Core.Seconds (duration, period)
+import Behavior.Internal.Seam.Runtime (Label (..), sleepToSlot)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Outcome (..), Run (outcome), explain, explore, randomly, simulate)

@@ -17,7 +17,7 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (modifyMaxSuccess, prop)
 import Test.QuickCheck hiding (within)
 
-import Behavior.Internal.Runtime.TimerWheel
+import Behavior.Internal.Seam.TimerWheel
 import Memory
 import Support
 

@@ -14,7 +14,7 @@ import Control.Concurrent.STM (STM, TVar, check, modifyTVar', newTVarIO, readTVa
 import Control.Exception
 import Control.Monad (replicateM)
 
-import Behavior.Internal.Runtime (checkpoint)
+import Behavior.Internal.Seam.Runtime (checkpoint)
 import Behavior.STM (atomically)
 import Behavior.Signal (watching)
 import Language.Operator

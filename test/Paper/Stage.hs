@@ -31,7 +31,7 @@ import Data.Maybe (fromMaybe)
 import Test.Hspec (shouldBe)
 
 import Behavior (Behavior, Failed (..), failWith)
-import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.Internal.Seam.Runtime (liveThreadCount)
 import Behavior.STM (atomically)
 import Robot (inWorld)
 import Support (Ending (..), ending, hang)

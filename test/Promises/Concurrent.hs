@@ -24,7 +24,7 @@ import Data.Maybe (fromMaybe, listToMaybe)
 import Test.QuickCheck (Gen, choose, elements, frequency, vectorOf)
 
 import Behavior (Behavior, BehaviorFailed, attempt, both, failingOn, fallback, parallel)
-import Behavior.Internal.Failure (isCancellation)
+import Behavior.Internal.Core.Failure (isCancellation)
 import qualified Behavior.Parallel as Parallel
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal

@@ -24,7 +24,7 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (isNothing)
 
 import Behavior (Behavior, BehaviorFailed, attempt, both, failWith, fallback, parallel)
-import Behavior.Internal.Runtime (Label (..), atomically, liveThreadCount)
+import Behavior.Internal.Seam.Runtime (Label (..), atomically, liveThreadCount)
 import qualified Behavior.Parallel as Parallel
 import Behavior.Signal (Signal, watching)
 import qualified Behavior.Signal as Signal

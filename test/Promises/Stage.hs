@@ -49,8 +49,8 @@ import Test.QuickCheck.Gen (unGen)
 import Test.QuickCheck.Random (mkQCGen)
 
 import Behavior (Behavior, Seconds, sleep)
-import Behavior.Internal.Failure (isCancellation)
-import Behavior.Internal.Runtime
+import Behavior.Internal.Core.Failure (isCancellation)
+import Behavior.Internal.Seam.Runtime
   ( Label (..)
   , threadId
   , atomically

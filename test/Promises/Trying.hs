@@ -17,7 +17,7 @@ import Data.List (foldl')
 import GHC.Conc (ThreadStatus (..), threadStatus)
 
 import Behavior (Behavior)
-import Behavior.Internal.Runtime (interrupt)
+import Behavior.Internal.Seam.Runtime (interrupt)
 import Behavior.Sim
 import Promises.Stage
 import Support (Cancel (..), endingOf, within)

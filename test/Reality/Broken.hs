@@ -16,8 +16,8 @@ import Control.Monad (void, when)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Runtime.Backend
-import Behavior.Internal.Runtime.Dispatch (simulator, withBackend)
+import Behavior.Internal.Core.Backend
+import Behavior.Internal.Core.Dispatch (simulator, withBackend)
 
 -- | Runs a behaviour by the wrong rule, if this is a simulation.
 late :: IO a -> IO a

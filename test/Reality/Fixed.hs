@@ -13,7 +13,7 @@ import Control.Exception
 import Control.Monad (void)
 
 import Behavior (Behavior, failWith, (?))
-import Behavior.Internal.Runtime (atomically, checkpoint, interrupt, now)
+import Behavior.Internal.Seam.Runtime (atomically, checkpoint, interrupt, now)
 import Behavior.Parallel (both, firstOf, parallel)
 import Behavior.Signal (watching)
 import qualified Behavior.Signal as Signal

@@ -32,8 +32,8 @@ import Data.Set (Set)
 import qualified Data.Set as Set
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 
-import Behavior.Internal.Runtime
-import Behavior.Internal.Runtime.Dispatch (inSimulation)
+import Behavior.Internal.Core.Dispatch (inSimulation)
+import Behavior.Internal.Seam.Runtime
 import Behavior.Sim
 import Support
 

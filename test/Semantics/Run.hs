@@ -31,8 +31,8 @@ import Data.Maybe (isJust)
 import Data.Set (Set)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Failure
-import Behavior.Internal.Runtime
+import Behavior.Internal.Core.Failure
+import Behavior.Internal.Seam.Runtime
 import Behavior.Message (withInbox)
 import Behavior.Parallel (firstOf)
 import Behavior.Signal (debounce, hysteresis, polling, staleAfter, throttle, watching)

@@ -17,7 +17,7 @@ import System.Mem.Weak (deRefWeak)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime
+import Behavior.Internal.Seam.Runtime
 import Behavior.Parallel (firstOf)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim

@@ -10,7 +10,7 @@ import Data.List (isInfixOf, isPrefixOf, nub, sort)
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Runtime (annotate)
+import Behavior.Internal.Seam.Runtime (annotate)
 import Behavior.Parallel (allOf)
 import Behavior.STM (atomically)
 import Behavior.Sim

@@ -10,8 +10,8 @@ import System.IO.Error (isUserError)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Failure (isCancellation, isFailure)
-import Behavior.Internal.Runtime (Label (..), threadId, throwToAll, start, threadEnd)
+import Behavior.Internal.Core.Failure (isCancellation, isFailure)
+import Behavior.Internal.Seam.Runtime (Label (..), threadId, throwToAll, start, threadEnd)
 import Behavior.Parallel (firstOf)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal

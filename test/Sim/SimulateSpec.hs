@@ -18,9 +18,9 @@ import qualified System.Timeout as System
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Internal.Failure (isCancellation, isFailure)
-import Behavior.Internal.Runtime (annotate)
-import Behavior.Internal.Runtime.Counter (simulations, total)
+import Behavior.Internal.Core.Counter (simulations, total)
+import Behavior.Internal.Core.Failure (isCancellation, isFailure)
+import Behavior.Internal.Seam.Runtime (annotate)
 import Behavior.Parallel (fork, scoped)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal

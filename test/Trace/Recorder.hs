@@ -21,11 +21,11 @@ import Control.Exception (Exception (..), SomeException (..), mask, throwIO, try
 import Data.Bits (shiftR, xor)
 import Data.IORef
 
-import Behavior.Internal.Failure (Behavior, BehaviorFailed (..), StoppedWithFault (..), isCancellation)
+import Behavior.Internal.Core.Failure (Behavior, BehaviorFailed (..), StoppedWithFault (..), isCancellation)
 import qualified Behavior.Internal.Signal.Source as Signal
-import Behavior.Internal.Trace.Event (Event)
-import Behavior.Internal.Trace.Place hiding (around)
-import Behavior.Internal.Trace.Span (named)
+import Behavior.Internal.Spans.Event (Event)
+import Behavior.Internal.Spans.Place hiding (around)
+import Behavior.Internal.Spans.Span (named)
 import Behavior.Sim (Run (events), Schedule)
 import Semantics.Path (Seen)
 import Semantics.Program hiding (number)

@@ -12,7 +12,7 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe, isJust, isNothing, listToMaybe, maybeToList)
 
-import Behavior.Internal.Trace.Event
+import Behavior.Internal.Spans.Event
 import qualified Behavior.Sim as Sim
 import Semantics.Path (Seen (..))
 import Semantics.Program
@@ -500,7 +500,8 @@ values x =
       OnMessage _ _ -> null levels
       _ -> isJust (timeLimit p) && null levels
   isTeleoReactive = \case TeleoReactive _ -> True; _ -> False
-  direct p = programName p /= Just "onMessage" && not (any (`isInfixOf` show (Program.signals p)) ["Debounce", "Throttle", "Hysteresis", "Shared"])
+  direct p = programName p /= Just "onMessage" && not (any (`isInfixOf` show (Program.signals p)) notDirect)
+  notDirect = ["Debounce", "Throttle", "Hysteresis", "Shared"]
   -- The numbers of the spans before and after say where in the record the operator decided.
   held at r c =
     let n = reactionNumber r

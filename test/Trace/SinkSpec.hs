@@ -14,7 +14,7 @@ import System.IO.Unsafe (unsafePerformIO)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (liveThreadCount)
+import Behavior.Internal.Seam.Runtime (liveThreadCount)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (..), defaultSimOptions, explain, outcome, simulateWith)

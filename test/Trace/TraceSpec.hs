@@ -17,9 +17,9 @@ import GHC.Conc (ThreadStatus (..), threadStatus)
 import Test.Hspec
 
 import Behavior
-import Behavior.Internal.Runtime (liveThreadCount)
-import Behavior.Internal.Trace.Place (Place (trace), Receiver (..), Trace (traceClock), inPlace, myPlace, withReceiver)
-import Behavior.Internal.Trace.Span (abandonableIn)
+import Behavior.Internal.Seam.Runtime (liveThreadCount)
+import Behavior.Internal.Spans.Place (Place (trace), Receiver (..), Trace (traceClock), inPlace, myPlace, withReceiver)
+import Behavior.Internal.Spans.Span (abandonableIn)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal

@@ -13,7 +13,7 @@ import Data.Char (GeneralCategory (..), generalCategory)
 import Data.Functor.Identity (runIdentity)
 import Test.QuickCheck
 
-import Behavior.Internal.Trace.Event (traverseTexts)
+import Behavior.Internal.Spans.Event (traverseTexts)
 import Behavior.Time (Seconds)
 import Behavior.Trace
 import Viewer.Examples

@@ -4,7 +4,7 @@ import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck
 
-import Behavior.Internal.Trace.Text
+import Behavior.Internal.Tracing.Text
 import Behavior.Trace
 import Viewer.Examples
 import Viewer.Generate

@@ -7,7 +7,7 @@ import Test.Hspec hiding (after)
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck
 
-import Behavior.Internal.Trace.Text
+import Behavior.Internal.Tracing.Text
 import Behavior.Trace
 import Behavior.Trace.Recording
 import Behavior.Trace.Svg

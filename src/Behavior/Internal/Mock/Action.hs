@@ -19,14 +19,14 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
 
-import Behavior.Internal.Failure (Behavior, Failed (..), isCancellation, isFailure)
+import Behavior.Internal.Core.Failure (Behavior, Failed (..), isCancellation, isFailure)
+import Behavior.Internal.Core.SafeText
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Script
 import Behavior.Internal.Mock.Subject (SubjectKind (..))
 import Behavior.Internal.Mock.World
-import Behavior.Internal.Runtime
-import Behavior.Internal.SafeText
-import Behavior.Internal.Trace.Span (actionSpan)
+import Behavior.Internal.Seam.Runtime
+import Behavior.Internal.Spans.Span (actionSpan)
 
 -- $setup
 -- >>> import Behavior

@@ -26,12 +26,12 @@ import Data.Foldable (for_)
 import Data.List (intercalate, sortOn)
 import Data.Maybe (listToMaybe)
 
+import Behavior.Internal.Core.SafeText (settledText)
 import Behavior.Internal.Mock.Interval
 import Behavior.Internal.Mock.Moment
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
-import Behavior.Internal.Runtime (Seconds)
-import Behavior.Internal.SafeText (settledText)
+import Behavior.Internal.Seam.Runtime (Seconds)
 
 -- $setup
 -- >>> import Data.List (sortOn)

@@ -21,11 +21,11 @@ import Control.Exception (mask_)
 import Data.Foldable (for_, traverse_)
 import Data.Maybe (isJust, listToMaybe)
 
-import Behavior.Internal.Failure (Behavior, failWith)
+import Behavior.Internal.Core.Failure (Behavior, failWith)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject (SubjectKind (ACondition))
 import Behavior.Internal.Mock.World
-import Behavior.Internal.Runtime
+import Behavior.Internal.Seam.Runtime
 import Behavior.Internal.Signal.Source
   ( Signal (..)
   , Source (workers)

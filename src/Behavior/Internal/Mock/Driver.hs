@@ -11,7 +11,7 @@ import Data.Foldable (for_)
 
 import Behavior.Internal.Mock.Subject (SubjectKind (ADriver))
 import Behavior.Internal.Mock.World
-import Behavior.Internal.Runtime
+import Behavior.Internal.Seam.Runtime
 
 -- $setup
 -- >>> import Behavior

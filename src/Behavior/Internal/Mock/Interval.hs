@@ -39,7 +39,7 @@ import Data.Maybe (mapMaybe)
 
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
-import Behavior.Internal.Runtime (Seconds)
+import Behavior.Internal.Seam.Runtime (Seconds)
 
 -- $setup
 -- >>> import Data.List (sortOn)

@@ -28,7 +28,7 @@ import Data.List (intercalate)
 import Behavior.Internal.Mock.Interval
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
-import Behavior.Internal.Runtime (Seconds)
+import Behavior.Internal.Seam.Runtime (Seconds)
 
 -- $setup
 -- >>> import Data.List (sortOn)

@@ -19,7 +19,7 @@ import Data.List (sortOn)
 import Data.Maybe (mapMaybe)
 
 import Behavior.Internal.Mock.Subject (Need, SubjectKind, unfit)
-import Behavior.Internal.Runtime (Seconds)
+import Behavior.Internal.Seam.Runtime (Seconds)
 
 -- | The record of a mock world: what has happened in it, in order. It is shown as a
 -- timeline, with one line for each entry.

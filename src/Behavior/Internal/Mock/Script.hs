@@ -34,8 +34,8 @@ module Behavior.Internal.Mock.Script
 import Control.Exception (ErrorCall (..), Exception (..), SomeException)
 import Data.Foldable (for_)
 
-import Behavior.Internal.Failure (Behavior, Failed (..))
-import Behavior.Internal.Seconds (Seconds, duration)
+import Behavior.Internal.Core.Failure (Behavior, Failed (..))
+import Behavior.Internal.Core.Seconds (Seconds, duration)
 
 -- $setup
 -- >>> import Behavior

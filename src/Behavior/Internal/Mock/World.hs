@@ -35,11 +35,11 @@ import Data.Foldable (for_)
 import Data.IORef
 import Data.Maybe (isJust, isNothing)
 
-import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Core.Failure (Behavior)
 import Behavior.Internal.Mock.Claim (Claim, premisesIn, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject
-import Behavior.Internal.Runtime
+import Behavior.Internal.Seam.Runtime
 
 -- $setup
 -- >>> import Behavior

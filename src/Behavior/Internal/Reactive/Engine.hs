@@ -16,12 +16,12 @@ module Behavior.Internal.Reactive.Engine
 import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
 
-import Behavior.Internal.Cause (Cause (..))
-import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime (announce, atomically, tryReadThenBlock)
-import Behavior.Internal.Scope
+import Behavior.Internal.Concurrent.Scope
+import Behavior.Internal.Core.Cause (Cause (..))
+import Behavior.Internal.Core.Failure (Behavior)
+import Behavior.Internal.Seam.Runtime (announce, atomically, tryReadThenBlock)
 import Behavior.Internal.Signal.Source
-import Behavior.Internal.Trace.Observer
+import Behavior.Internal.Spans.Observer
 
 -- | What an operator does for a value of the signal.
 data Response a

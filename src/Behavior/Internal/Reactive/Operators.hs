@@ -26,7 +26,7 @@ import Data.List (findIndex, intercalate, nub)
 import Data.Maybe (isNothing)
 import Prelude hiding (read)
 
-import Behavior.Internal.Failure (Behavior, failWith)
+import Behavior.Internal.Core.Failure (Behavior, failWith)
 import Behavior.Internal.Reactive.Engine
 import Behavior.Internal.Signal.Source
 

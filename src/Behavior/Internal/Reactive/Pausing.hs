@@ -14,14 +14,14 @@ import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
 import Control.Exception (mask_, throwIO, try)
 import Control.Monad (unless)
 
-import Behavior.Internal.Cause (Cause (..))
-import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Concurrent.Repeating (sleepForever)
+import Behavior.Internal.Concurrent.Scope
+import Behavior.Internal.Core.Cause (Cause (..))
+import Behavior.Internal.Core.Failure (Behavior)
+import Behavior.Internal.Core.Stop (causeOf)
 import Behavior.Internal.Reactive.Engine
-import Behavior.Internal.Repeating (sleepForever)
-import Behavior.Internal.Runtime (awaitUninterruptibly)
-import Behavior.Internal.Scope
+import Behavior.Internal.Seam.Runtime (awaitUninterruptibly)
 import Behavior.Internal.Signal.Source
-import Behavior.Internal.Stop (causeOf)
 
 -- $setup
 -- >>> import Behavior

@@ -10,9 +10,9 @@ module Behavior.Internal.Reactive.Polled
   , monitor
   ) where
 
-import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Core.Failure (Behavior)
 import qualified Behavior.Internal.Reactive.Operators as Signal
-import Behavior.Internal.Runtime (Seconds)
+import Behavior.Internal.Seam.Runtime (Seconds)
 import qualified Behavior.Internal.Signal.Polling as Signal
 
 -- | A reactive @if@: reads @test@ repeatedly, runs @left@ while it is true and

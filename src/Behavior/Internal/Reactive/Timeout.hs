@@ -15,15 +15,15 @@ module Behavior.Internal.Reactive.Timeout
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import Control.Exception (Exception (..), throwIO, uninterruptibleMask_)
 
-import Behavior.Internal.Cause (Cause (..))
-import Behavior.Internal.Failure
+import Behavior.Internal.Core.Cause (Cause (..))
+import Behavior.Internal.Core.Failure
   ( Behavior
   , behaviorFailedFromException
   , behaviorFailedToException
   )
+import Behavior.Internal.Core.Seconds (Seconds, duration, moment)
 import Behavior.Internal.Reactive.Engine (Response (..), react)
-import Behavior.Internal.Runtime (atomically, now, sleepUntil)
-import Behavior.Internal.Seconds (Seconds, duration, moment)
+import Behavior.Internal.Seam.Runtime (atomically, now, sleepUntil)
 import Behavior.Internal.Signal.Source (Signal (..), Source (..), Worker (..), constantView, fromView)
 
 -- $setup

@@ -18,10 +18,10 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), SomeException, throwIO)
 import Control.Monad (forever, unless, when)
 
-import Behavior.Internal.Runtime
-import Behavior.Internal.Seconds (duration, moment)
+import Behavior.Internal.Core.Seconds (duration, moment)
+import Behavior.Internal.Seam.Runtime
 import Behavior.Internal.Signal.Source
-import Behavior.Internal.Trace.Observer (Reading)
+import Behavior.Internal.Spans.Observer (Reading)
 
 -- $setup
 -- >>> import Behavior

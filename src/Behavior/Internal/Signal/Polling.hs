@@ -15,9 +15,9 @@ import Control.Exception (evaluate, mask, throwIO)
 import Control.Monad (forever, unless, when)
 import Data.IORef (newIORef, readIORef, writeIORef)
 
-import Behavior.Internal.Failure (Behavior, failWith, trySynchronous)
-import Behavior.Internal.Runtime
-import Behavior.Internal.Seconds (period, slotAfter)
+import Behavior.Internal.Core.Failure (Behavior, failWith, trySynchronous)
+import Behavior.Internal.Core.Seconds (period, slotAfter)
+import Behavior.Internal.Seam.Runtime
 import Behavior.Internal.Signal.Source
 
 -- $setup

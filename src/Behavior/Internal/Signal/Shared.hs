@@ -12,9 +12,9 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), finally)
 import Control.Monad (when)
 
-import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime
-import Behavior.Internal.Scope
+import Behavior.Internal.Concurrent.Scope
+import Behavior.Internal.Core.Failure (Behavior)
+import Behavior.Internal.Seam.Runtime
 import Behavior.Internal.Signal.Source
 
 -- $setup

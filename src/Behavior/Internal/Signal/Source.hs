@@ -42,11 +42,11 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException)
 import Data.Traversable (for)
 
-import Behavior.Internal.Failure (failWith)
-import Behavior.Internal.Runtime
-import Behavior.Internal.Scope
-import Behavior.Internal.Trace.Observer (Reading (..))
-import Behavior.Internal.Trace.Place (isTraced)
+import Behavior.Internal.Concurrent.Scope
+import Behavior.Internal.Core.Failure (failWith)
+import Behavior.Internal.Seam.Runtime
+import Behavior.Internal.Spans.Observer (Reading (..))
+import Behavior.Internal.Spans.Place (isTraced)
 
 -- $setup
 -- >>> import Behavior

@@ -14,9 +14,9 @@ import Data.List (intercalate, nub)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (mapMaybe)
 
-import Behavior.Internal.SafeText
-import Behavior.Internal.Seconds (Seconds)
-import Behavior.Internal.Trace.Event
+import Behavior.Internal.Core.SafeText
+import Behavior.Internal.Core.Seconds (Seconds)
+import Behavior.Internal.Spans.Event
 
 -- | For each operator that has reacted again and again at this time, and goes on: how often, the values to which it
 -- reacted, and what it started. The events are given latest first. (One that reacts less than once in a thousand of

@@ -29,10 +29,10 @@ import qualified Data.Map.Strict as Map
 import Data.Set (Set)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Runtime.Backend (Label (..))
-import Behavior.Internal.SafeText (settledText)
-import Behavior.Internal.Trace.Event
-import Behavior.Internal.Trace.Place (Around (..), Place (..), inPath)
+import Behavior.Internal.Core.Backend (Label (..))
+import Behavior.Internal.Core.SafeText (settledText)
+import Behavior.Internal.Spans.Event
+import Behavior.Internal.Spans.Place (Around (..), Place (..), inPath)
 
 -- | What a run can start, in each span with a name, by the span's number (0: in none).
 type Reached = IntMap Inner

@@ -28,7 +28,7 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust)
 
-import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Core.Seconds (Seconds)
 import Behavior.Internal.Sim.State
 
 -- | Puts a task into the right map, after a change of its position or of its exceptions.

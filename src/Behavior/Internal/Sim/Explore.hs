@@ -17,7 +17,7 @@ import Data.IORef
 import Data.Maybe (fromMaybe)
 import qualified Data.Sequence as Seq
 
-import Behavior.Internal.Failure (Behavior)
+import Behavior.Internal.Core.Failure (Behavior)
 import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Prefix

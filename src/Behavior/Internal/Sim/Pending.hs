@@ -28,7 +28,7 @@ import qualified Data.Map.Strict as Map
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import GHC.IO (unsafeUnmask)
 
-import Behavior.Internal.SafeText
+import Behavior.Internal.Core.SafeText
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types

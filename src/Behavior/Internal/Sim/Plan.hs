@@ -19,10 +19,10 @@ module Behavior.Internal.Sim.Plan
 import Control.Exception (Exception, SomeException)
 import Data.List (dropWhileEnd, intercalate)
 
-import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Core.Seconds (Seconds)
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Trace.Event (Event)
+import Behavior.Internal.Spans.Event (Event)
 
 -- $setup
 -- >>> import Behavior

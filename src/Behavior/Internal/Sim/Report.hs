@@ -19,10 +19,10 @@ import Control.Exception (ErrorCall (..), SomeException (..), displayException, 
 import Data.List (groupBy, intercalate, isInfixOf)
 import Numeric (showFFloat)
 
-import Behavior.Internal.Failure (isCancellation, isFailure)
-import Behavior.Internal.Runtime.Backend (Label)
-import Behavior.Internal.SafeText
-import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Core.Backend (Label)
+import Behavior.Internal.Core.Failure (isCancellation, isFailure)
+import Behavior.Internal.Core.SafeText
+import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Types
 
 -- $setup

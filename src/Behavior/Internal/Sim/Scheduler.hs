@@ -31,16 +31,16 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust)
 import Foreign.StablePtr (newStablePtr)
 
-import Behavior.Internal.Runtime.Backend
-import Behavior.Internal.Runtime.Property (Property)
-import Behavior.Internal.SafeText
+import Behavior.Internal.Core.Backend
+import Behavior.Internal.Core.Property (Property)
+import Behavior.Internal.Core.SafeText
 import Behavior.Internal.Sim.Coverage (canStart, starts)
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Trace.Place (myPlace)
+import Behavior.Internal.Spans.Place (myPlace)
 
 -- | The backend that the seam calls, for the simulation with this number, run by this property.
 simulation :: Int -> Maybe Property -> Sim -> Simulator

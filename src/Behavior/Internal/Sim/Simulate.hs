@@ -21,12 +21,12 @@ import Data.Maybe (isJust)
 import Data.Void (Void, absurd)
 import System.IO.Unsafe (unsafePerformIO)
 
-import Behavior.Internal.Failure (Behavior)
-import Behavior.Internal.Runtime.Backend
-import Behavior.Internal.Runtime.Dispatch
-import Behavior.Internal.Runtime.Property (Property)
-import Behavior.Internal.SafeText (settledText)
-import Behavior.Internal.Seconds (duration)
+import Behavior.Internal.Core.Backend
+import Behavior.Internal.Core.Dispatch
+import Behavior.Internal.Core.Failure (Behavior)
+import Behavior.Internal.Core.Property (Property)
+import Behavior.Internal.Core.SafeText (settledText)
+import Behavior.Internal.Core.Seconds (duration)
 import Behavior.Internal.Sim.Coverage (Reached)
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
@@ -34,8 +34,8 @@ import Behavior.Internal.Sim.Scheduler
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
 import Behavior.Internal.Sim.Watchdog
-import Behavior.Internal.Trace.Event (traverseTexts)
-import Behavior.Internal.Trace.Place (Receiver (..), Trace, inPlace, newTrace, placeIn, withReceiver)
+import Behavior.Internal.Spans.Event (traverseTexts)
+import Behavior.Internal.Spans.Place (Receiver (..), Trace, inPlace, newTrace, placeIn, withReceiver)
 
 -- $setup
 -- >>> import Behavior

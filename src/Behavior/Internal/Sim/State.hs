@@ -45,12 +45,12 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Void (Void)
 
-import Behavior.Internal.Runtime.Backend
-import Behavior.Internal.Seconds (Seconds)
+import Behavior.Internal.Core.Backend
+import Behavior.Internal.Core.Seconds (Seconds)
 import Behavior.Internal.Sim.Coverage (Reached, nothingYet)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Trace.Event (Event)
+import Behavior.Internal.Spans.Event (Event)
 
 -- | A simulation.
 data Sim = Sim

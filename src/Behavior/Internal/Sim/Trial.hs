@@ -21,15 +21,15 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
 
-import Behavior.Internal.Failure (Behavior, isCancellation)
-import Behavior.Internal.Runtime.Property
+import Behavior.Internal.Core.Failure (Behavior, isCancellation)
+import Behavior.Internal.Core.Property
 import Behavior.Internal.Sim.Coverage
 import Behavior.Internal.Sim.Plan
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Report
 import Behavior.Internal.Sim.Simulate
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Trace.Event (Event)
+import Behavior.Internal.Spans.Event (Event)
 
 -- | One run of the property: its exception, and the simulated run.
 data Trial = Trial

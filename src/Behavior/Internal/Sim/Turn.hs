@@ -20,16 +20,16 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust, isNothing)
 
-import Behavior.Internal.Runtime.Backend
-import Behavior.Internal.Runtime.OsSleep
-import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Core.Backend
+import Behavior.Internal.Core.OsSleep
+import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Internal.Sim.Circle
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
-import Behavior.Internal.Trace.Place (Place (path), inPath, placeOf)
+import Behavior.Internal.Spans.Place (Place (path), inPath, placeOf)
 
 -- | The task that runs next. 'Nothing': the run has ended here, and the driver has the turn.
 choose :: Sim -> Maybe Task -> IO (Maybe Task)

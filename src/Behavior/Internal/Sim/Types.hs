@@ -22,9 +22,9 @@ module Behavior.Internal.Sim.Types
 
 import Control.Exception (SomeException)
 
-import Behavior.Internal.Runtime.Backend (Label)
-import Behavior.Internal.Seconds (Seconds)
-import Behavior.Internal.Trace.Event (Event)
+import Behavior.Internal.Core.Backend (Label)
+import Behavior.Internal.Core.Seconds (Seconds)
+import Behavior.Internal.Spans.Event (Event)
 
 -- | How to simulate.
 --

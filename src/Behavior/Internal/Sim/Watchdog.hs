@@ -20,8 +20,8 @@ import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import System.IO (hFlush, hPutStrLn, stderr)
 import System.IO.Unsafe (unsafePerformIO)
 
-import Behavior.Internal.Runtime.OsSleep
-import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Core.OsSleep
+import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn (waitingTasks)
 import Behavior.Internal.Sim.Types

@@ -18,7 +18,7 @@ import Data.Maybe (fromMaybe)
 import Data.Text (Text)
 import qualified Data.Text as Text
 
-import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Trace
 import Behavior.Trace.Describe (inertUpTo)
 import Behavior.Trace.Json (nestsDeeperThan)

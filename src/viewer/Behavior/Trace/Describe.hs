@@ -30,7 +30,7 @@ module Behavior.Trace.Describe
   , lostRemark
   ) where
 
-import Behavior.Internal.Trace.Text
+import Behavior.Internal.Tracing.Text
 import Behavior.Trace
 
 -- | How a span ended, and why.

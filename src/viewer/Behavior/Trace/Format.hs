@@ -24,7 +24,7 @@ import qualified Data.Text as Text
 import Data.Time.Clock (UTCTime)
 import Data.Time.Format.ISO8601 (iso8601Show)
 
-import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Trace
 import Behavior.Trace.Decode
 import Behavior.Trace.Json

@@ -15,7 +15,7 @@ import Data.List (foldl', intersperse, sortOn)
 import Data.Maybe (listToMaybe)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Seconds (Seconds (..))
+import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Trace
 import Behavior.Trace.Describe
 import Behavior.Trace.Json
