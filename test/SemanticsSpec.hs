@@ -80,11 +80,11 @@ allThatIsAllowedOf some =
       . counterexample (show found)
       $ found `elem` [Fine, Undecided]
 
--- | Worlds in which timers are late. (Without polled sensors and periods, whose slots are not late: each
--- counts from the slot before, whenever what is done there began.)
+-- | Worlds in which timers are late. (Without polled sensors, whose slots are not late: each
+-- counts from the slot before, whenever the reading there began.)
 slipping :: Gen World -> Gen World
 slipping some = do
-  world <- some `suchThat` \world -> not (any (`isInfixOf` show (program world)) ["Polled", "Every"])
+  world <- some `suchThat` (not . isInfixOf "Polled" . show . program)
   (\n -> world {slippage = n}) <$> choose (1, 3)
 
 -- | Worlds for situations that random worlds rarely have.

@@ -67,7 +67,7 @@ begin t p = case p of
   FallbackOver (act : acts) -> begin t (act `Else` FallbackOver acts)
   Retrying [] act -> begin t act
   Retrying (wait : later) act -> begin t (act `Else` (Sleep wait `Then` Retrying later act))
-  Every interval act -> inSlot interval (clock t) act (begin t act)
+  Every interval act -> inSlot t interval (clock t) act (begin t act)
   Deliver -> Delivering
   HandleNext act -> Entering (Taking True act)
   Parallel left right -> Waiting Race [thread t "parallel: left" (void left), thread t "parallel: right" (void right)]
@@ -121,10 +121,11 @@ continued t second = case begin t second of
   Over (FailedWith _) -> Starting second
   begun -> begun
 
--- | The run of a program that runs again in each slot: when it has succeeded, the next slot is awaited.
-inSlot :: Ticks -> Ticks -> Program -> Running -> Running
-inSlot interval from act = \case
-  Over (Succeeded _) -> AwaitingSlot interval (from + interval) act
+-- | The run of a program that runs again in each slot: when it has succeeded, the next slot is awaited. Slots that
+-- were missed by then are skipped.
+inSlot :: Now -> Ticks -> Ticks -> Program -> Running -> Running
+inSlot t interval from act = \case
+  Over (Succeeded _) -> AwaitingSlot interval (until (>= clock t) (+ interval) (from + interval)) act
   Over wrong -> Over wrong
   r -> InSlot interval from act r
 

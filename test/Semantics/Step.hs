@@ -73,11 +73,9 @@ steps t = \case
   first `AndThen` second -> [(l, t', andThen t' r second) | (l, t', r) <- steps t first]
   first `OrElse` second -> [(l, t', orElse t' r second) | (l, t', r) <- steps t first]
   Sleeping due -> [over' | clock t >= due, over' <- silently t (Over (Succeeded Unit))]
-  InSlot interval from p r -> [(l, t', inSlot interval from p r') | (l, t', r') <- steps t r]
-  AwaitingSlot interval due p
-    -- Slots that were missed are skipped.
-    | due < clock t -> silently t (AwaitingSlot interval (due + interval) p)
-    | otherwise -> [begun | clock t >= due, begun <- silently t (inSlot interval due p (continued t p))]
+  InSlot interval from p r -> [(l, t', inSlot t' interval from p r') | (l, t', r') <- steps t r]
+  AwaitingSlot interval due p ->
+    [begun | clock t >= due, begun <- silently t (inSlot t interval due p (continued t p))]
   Entering r -> silently t r
   Uninterruptibly (Over result) -> silently t (Over result)
   Uninterruptibly r -> [(l, t', Uninterruptibly r') | (l, t', r') <- steps t r]
@@ -283,7 +281,7 @@ receive t = \case
   AwaitingChild k r -> within' (AwaitingChild k) r
   AsChild k r -> fmap (AsChild k) <$> receive t r
   Sleeping _ -> stopped
-  InSlot interval from p r -> fmap (inSlot interval from p) <$> receive t r
+  InSlot interval from p r -> fmap (inSlot t interval from p) <$> receive t r
   AwaitingSlot {} -> stopped
   Entering _ -> stopped
   Uninterruptibly _ -> []
