@@ -2,14 +2,14 @@
 -- Trying again after a pause, and doing something periodically.
 module Behavior.RepeatingSpec (spec) where
 
-import Control.Concurrent (forkIO, killThread, mkWeakThreadId, yield)
+import Control.Concurrent (ThreadId, forkIO, killThread, mkWeakThreadId, yield)
 import Control.Exception
 import Control.Monad (forever, replicateM_, when)
 import Data.Foldable (for_, traverse_)
 import Data.IORef
 import Data.Maybe (isJust)
 import System.Mem (performMajorGC)
-import System.Mem.Weak (deRefWeak)
+import System.Mem.Weak (Weak, deRefWeak)
 import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 import Test.QuickCheck hiding (Failure)
@@ -118,18 +118,20 @@ endless = do
     cancelling sleepForever (pure ()) `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
 
   it "is not taken for a deadlock by GHC" $ do
-    let endOfUnreachable :: IO () -> IO () -> (Maybe (Ending ()) -> Bool) -> IO ()
-        endOfUnreachable act looking expected = do
-          end <- newIORef Nothing
-          -- (What has a thread's id keeps GHC from taking it for deadlocked.)
-          thread <- forkIO (ending act >>= writeIORef end . Just) >>= mkWeakThreadId
-          looking
-          readIORef end >>= (`shouldSatisfy` expected)
-          deRefWeak thread >>= traverse_ killThread
-          eventually (isJust <$> readIORef end)
-        collecting n = replicateM_ n (performMajorGC >> yield)
-    endOfUnreachable hang (collecting 10) (== Just (FaultedWith (show BlockedIndefinitelyOnSTM)))
-    endOfUnreachable (sleepForever ||| sleepForever) (collecting 10) (== Nothing)
+    let -- (What has a thread's id keeps GHC from taking it for deadlocked.)
+        unreachable :: IO () -> IORef (Maybe (Ending ())) -> IO (Weak ThreadId)
+        unreachable act end = forkIO (ending act >>= writeIORef end . Just) >>= mkWeakThreadId
+        collecting = performMajorGC >> yield
+    ofHang <- newIORef Nothing
+    ofSleep <- newIORef Nothing
+    sleeping <- unreachable (sleepForever ||| sleepForever) ofSleep
+    _ <- unreachable (hang ||| hang) ofHang
+    eventually (collecting >> isJust <$> readIORef ofHang)
+    replicateM_ 10 collecting
+    readIORef ofHang `shouldReturn` Just (FaultedWith (show BlockedIndefinitelyOnSTM))
+    readIORef ofSleep `shouldReturn` Nothing
+    deRefWeak sleeping >>= traverse_ killThread
+    eventually (isJust <$> readIORef ofSleep)
 
   it "is a deadlock of a simulation in which nothing else can run, and is named" $ do
     run <- simulateWith defaultSimOptions (sleepForever ||| sleepForever :: Behavior ())
