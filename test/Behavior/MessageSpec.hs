@@ -163,19 +163,6 @@ handlingEach = do
       -- ... unless its handler is interrupted, and it has to wait again.
       _ <- ending (handleNext box (\_ -> deliver 'c' >> failed) :: Behavior ())
       atomically ((,) <$> allOf box <*> dropped box) `shouldReturn` ("c", 1)
-
-  it "a hundred thousand messages, in constant memory" $
-    inConstantMemory 100000 $ \step -> do
-      count <- newTVarIO (0 :: Int)
-      deliverNext <- newIORef (pure ())
-      withInbox 1 (\deliver -> pure () <$ (writeIORef deliverNext (deliver ()) >> deliver ())) $ \box -> do
-        next <- readIORef deliverNext
-        let handle () = pure (modifyTVar' count (+ 1))
-            task = do
-              step
-              n <- readTVarIO count
-              unless (n >= 100000) (next >> hang)
-        onMessage box handle task
  where
   handler entries script m = do
     Support.note entries [m]

@@ -21,7 +21,6 @@ import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Run (finished), explore, randomly, simulate)
 import Behavior.Time (now, sleepUntil)
-import Memory (inConstantMemory)
 import Support
 import Watched
 
@@ -78,16 +77,6 @@ changes = do
         branch (n, c) = note seen (n, c) >> unless (c == 'd') (atomically (writeTVar level (succ c)) >> hang)
     Signal.switch signal branch
     notes seen `shouldReturn` zip [0 ..] "abcd"
-
-  it "a hundred thousand changes, in constant memory" $
-    inConstantMemory 100000 $ \step -> do
-      level <- newTVarIO (0 :: Int)
-      count <- newIORef (0 :: Int)
-      Signal.switch (Signal.changes (watchedVar level)) $ \_ -> do
-        step
-        modifyIORef' count (+ 1)
-        n <- readIORef count
-        unless (n > 100000) (atomically (modifyTVar' level (+ 1)) >> hang)
 
 olderThan :: Spec
 olderThan = do

@@ -1,13 +1,15 @@
 -- |
--- The reactive operators run in constant memory, however often they switch, and never
+-- The reactive operators, filters and messages run in constant memory, however often they switch, and never
 -- run two branches at the same time in a million switches.
 module Behavior.ReactiveSpaceSpec (spec) where
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (replicateM_, unless)
+import Data.IORef (modifyIORef', newIORef, readIORef, writeIORef)
 import Test.Hspec
 
 import Behavior.Internal.Seam.Runtime (atomically)
+import Behavior.Message (onMessage, withInbox)
 import qualified Behavior.Signal as Signal
 import Memory
 import Support
@@ -66,3 +68,26 @@ spec = around_ (within 120 . leavingNothing . onOneCapability) . describe "In co
     inConstantMemory 100000 $ \step ->
       Signal.withShared (Signal.hysteresis False 0 1 (pure (1 :: Int))) $ \s ->
         replicateM_ 100000 (step >> Signal.waitUntil s)
+
+  it "a hundred thousand changes" $
+    inConstantMemory 100000 $ \step -> do
+      level <- newTVarIO (0 :: Int)
+      count <- newIORef (0 :: Int)
+      Signal.switch (Signal.changes (watchedVar level)) $ \_ -> do
+        step
+        modifyIORef' count (+ 1)
+        n <- readIORef count
+        unless (n > 100000) (atomically (modifyTVar' level (+ 1)) >> hang)
+
+  it "a hundred thousand messages" $
+    inConstantMemory 100000 $ \step -> do
+      count <- newTVarIO (0 :: Int)
+      deliverNext <- newIORef (pure ())
+      withInbox 1 (\deliver -> pure () <$ (writeIORef deliverNext (deliver ()) >> deliver ())) $ \box -> do
+        next <- readIORef deliverNext
+        let handle () = pure (modifyTVar' count (+ 1))
+            task = do
+              step
+              n <- readTVarIO count
+              unless (n >= 100000) (next >> hang)
+        onMessage box handle task
