@@ -36,8 +36,8 @@
 --    then waits.
 -- 7. /Constant space./ A million reselections, recoveries, retries or alternatives
 --    (nested to the right) run in constant memory.
--- 8. /Labelled./ Every thread is labelled with its operator and branch. (Before GHC 9.6, where
---    only an event log shows labels, only while one is written.)
+-- 8. /Labelled./ Every thread is labelled with its operator and branch. (Before GHC 9.6 only an
+--    event log shows labels: there a thread has one only while an event log is written.)
 -- 9. /A dead sensor is never \"false\"./ A condition that fails, faults or no longer has a
 --    value ends its operator with a failure or fault, after the branch has stopped.
 -- 10. /Nothing spins./ An operator that waits uses no processor time. Readings of one
@@ -46,7 +46,7 @@
 --
 -- == Which outcome, when several things happened
 --
--- The first of these questions that is answered with yes decides:
+-- An operator asks in this order; the first yes decides:
 --
 -- 1. Was an exception, of whatever type, thrown at the caller from outside? (As by
 --    @throwTo main (ExitFailure 3)@ in a signal handler.) Every branch is stopped, and the
@@ -84,15 +84,16 @@
 -- @finally@, @bracket@ and @onException@ run a cleanup masked. Still, a stop request can
 -- interrupt a blocking operation in it ('sleep', a transaction that retries), if the
 -- behaviour had ended by itself and was already cleaning up when its stop was requested. The
--- rest of the cleanup is then skipped, and the recovery starts. Make a cleanup that must be
--- finished uninterruptible, or better, give it a limit ('Behavior.Time.cleanupWithin'); the operator
--- that stops it waits for it:
+-- rest of the cleanup is then skipped, and the recovery starts. If a cleanup must run to its end,
+-- make it uninterruptible, or better, give it a limit ('Behavior.Time.cleanupWithin'); the operator
+-- that stops the behaviour waits for it:
 --
 -- > (extend arm >> takePicture) `finally` cleanupWithin 3 (park arm)
 --
 -- A behaviour that may hang where nothing can interrupt it, so that its operator would wait for ever,
--- can be abandoned: 'Behavior.Time.abandoning' is the only way out of promises 1, 2 and 4. (What else can
--- outlive an operator is no behaviour: a sink that is blocked at the end of its trace, see "Behavior.Trace".)
+-- can be abandoned: 'Behavior.Time.abandoning' is the only way out of promises 1, 2 and 4. (One other thing can
+-- outlive what started it, and it runs no behaviour: a sink that is blocked at the end of its trace, see
+-- "Behavior.Trace".)
 --
 -- == What GHC limits
 --
@@ -102,10 +103,10 @@
 --
 -- > parallel drive (steer `finally` throwTo me EmergencyStop)
 --
--- A second exception hangs. So does one for a caller that is masked or has already been
--- stopped, as the caller of a nested operator is when the outer operator has been stopped:
+-- A second such @throwTo@ never returns. Neither does one to a caller that is masked or has already
+-- been stopped (as the caller of a nested operator is when the outer operator has been stopped):
 -- @throwTo@ waits for the caller, and the caller waits for the cleanup. (A simulation ends
--- there, and names both threads.) Let a separate thread throw it:
+-- there, and names both threads.) Let a separate thread throw the exception:
 --
 -- > parallel drive (steer `finally` forkIO (throwTo me EmergencyStop))
 --

@@ -39,8 +39,8 @@
 -- be known: @5 > 3@ does not compile here, nor does @fallback failed (return 1)@. In
 -- your own code, use "Behavior".
 --
--- Some of the paper's listings do not do what its text states: they are listed in the table
--- of errata, @docs/errata.md@.
+-- Some of the paper's listings do not do what its text states: the page of errata,
+-- @docs/errata.md@, lists them.
 module Behavior.Paper
   ( -- * Conditions
     Condition (..)

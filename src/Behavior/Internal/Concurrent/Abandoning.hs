@@ -44,18 +44,19 @@ import Behavior.Internal.Spans.Span (abandonableIn)
 -- > insteadWhen wind land (both fly (abandoning 2 film))
 --
 -- [Result] The behaviour's.
--- [Failure] Of the behaviour: thrown. While the behaviour is being stopped: the cancellation goes on.
+-- [Failure] Of the behaviour: thrown; but one that it throws while it is being stopped is dropped, and the
+--   cancellation goes on.
 -- [Fault] Of the behaviour, also while it is being stopped: thrown.
 -- [Cancellation] Requests the behaviour's stop. If the behaviour ends in time, all is as in any
 --   operator. Otherwise the cancellation goes on, and what the behaviour returns or throws later is
 --   reported, but has no effect. While it is awaited nothing interrupts the caller.
 --
--- An 'Abandoned' reports when a behaviour is abandoned, and when it ends at last, with what. It is
--- passed to GHC's handler for uncaught exceptions, which prints it to @stderr@ unless
--- 'GHC.Conc.setUncaughtExceptionHandler' has set another. (In a simulation it is in the record of the run.)
--- Until it ends, an abandoned behaviour is counted ('abandonedCount'), and keeps its thread and two that wait for
--- it. The end of the program ends it, without a report. With zero seconds, even a behaviour that would have
--- stopped at once is abandoned.
+-- An 'Abandoned' reports that a behaviour was abandoned; another one reports when the behaviour ends at last, and
+-- how. Both are passed to GHC's handler for uncaught exceptions, which prints them to @stderr@ unless
+-- 'GHC.Conc.setUncaughtExceptionHandler' has set another. (In a simulation they are in the record of the run.)
+-- Until it ends, an abandoned behaviour is counted ('abandonedCount'), and occupies three threads: its own, and
+-- two that wait for its end. The end of the program ends it, without a report. With zero seconds, even a behaviour
+-- that would have stopped at once is abandoned.
 --
 -- A negative number or NaN is refused with an 'Control.Exception.ErrorCall' (a fault).
 --
@@ -67,7 +68,7 @@ abandoning :: Seconds -> Behavior a -> Behavior a
 abandoning seconds act = do
   limit <- duration "abandoning" seconds
   isAbandoned <- newTVarIO False
-  -- It is counted off by the transaction in which it ends.
+  -- The transaction that publishes its end takes it off the count.
   let countOff _ = readTVar isAbandoned >>= \is -> when is (modifyTVar' abandonedNow (subtract 1))
   -- Masked, so that no exception comes before the handler is in place: without it 'structured' would
   -- wait for the branch.
@@ -106,9 +107,9 @@ stopWithin limit isAbandoned endSpans scope cause acting = do
 --
 -- @since 0.1.0.0
 data Abandoned
-  = -- | It was abandoned: it has not ended that many seconds after its stop was requested.
+  = -- | It was abandoned: it had not ended this number of seconds after its stop was requested.
     StillRuns Seconds
-  | -- | It has ended now; with a failure or fault, if it has thrown one.
+  | -- | It has ended now; with this failure or fault, if it threw one.
     HasEnded (Maybe SomeException)
 
 instance Show Abandoned where

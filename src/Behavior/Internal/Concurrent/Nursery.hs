@@ -89,8 +89,8 @@ instance Exception ChildStopped where
 --   in the order in which they were forked), in a cleanup too, is always thrown.
 -- [Cancellation] Requests the stop of all together; returns after all have ended.
 --
--- A child costs the same, however many there are. Of those that have ended, it keeps at most twice as
--- many as ran at the same time, or 16.
+-- A child costs the same, however many there are. Of the children that have ended, the nursery keeps at most
+-- twice as many as ran at the same time, or 16.
 --
 -- >>> :{
 -- scoped $ \nursery -> do
@@ -114,8 +114,8 @@ serveRequests :: Nursery -> Scope -> Behavior a -> IO (Verdict a)
 serveRequests nursery scope body = do
   failure <- newLeftmost
   main <- branch scope "body" body
-  let -- How many were forked, and at which number the scope is to forget those that have ended. That
-      -- walks over all of them, so it waits for as many forks as there are branches left.
+  let -- How many were forked, and at which number the scope is to forget those that have ended. To forget
+      -- is a walk over all branches: so the next one comes after as many forks as this one has left branches.
       serve count sweepAt = do
         next <-
           atomically $
@@ -133,7 +133,7 @@ serveRequests nursery scope body = do
         Stop _ -> pure count
         Fork act accepted -> do
           let n = count + 1 :: Int
-          -- Masked: a branch that was started is also handed over.
+          -- Masked, so that each branch that was started is also handed over.
           mask_ $
             branchWith plainly {hook = traverse_ (publish failure n) . thrownBy} scope "fork" (const act)
               >>= atomically . putTMVar accepted
@@ -165,8 +165,8 @@ thrownBy = \case
 fork :: Nursery -> Behavior a -> Behavior (Child a)
 fork nursery act = do
   accepted <- newEmptyTMVarIO
-  -- (Without -threaded, GHC wakes those that wait for a variable also after a transaction that has only
-  -- read it. So this is none: if the state changes before the request, that is not served.)
+  -- (Not a transaction: without -threaded, one that only reads a variable also wakes the threads that wait for
+  -- that variable. If the state changes between this reading and the request, the request is not served.)
   readTVarIO (state nursery) >>= \case
     Open -> atomically (request nursery (Fork act accepted))
     Ending -> failEnding

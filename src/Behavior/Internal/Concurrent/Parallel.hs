@@ -169,15 +169,15 @@ allOf behaviors = structured "allOf" $ \scope -> do
 --
 -- The function is given the ends so far, by position: 'Nothing' while a behaviour runs, then its
 -- failure or its result. As soon as it chooses, the others are stopped; when they have ended, the
--- chosen behaviour runs. It is asked before the start (what is certain then starts nothing), and
--- after each end; several ends may have come together. It runs in a transaction, and perhaps more
--- often than necessary.
+-- chosen behaviour runs. The function is called before the start (if it chooses then, nothing is
+-- started), and after each end; several ends may have come together. It runs in a transaction, and
+-- perhaps more often than necessary.
 --
 -- [Result] That of the chosen behaviour.
 -- [Failure] That of the chosen behaviour. A behaviour's own failure is only passed to the function.
--- [Fault] The leftmost fault of all, in a cleanup too, is always thrown; then nothing chosen runs.
---   What the function throws is thrown. When all have ended and it has still not chosen, that
---   is a fault too.
+-- [Fault] The leftmost fault of all, in a cleanup too, is always thrown; then no chosen behaviour
+--   runs. What the function throws is thrown. If all have ended and the function has still not chosen,
+--   that is a fault too.
 -- [Cancellation] Requests the stop of all together; returns after all have ended. The chosen
 --   behaviour runs in the caller's thread.
 --
@@ -232,9 +232,9 @@ decide choose behaviors =
 --
 -- > agreeing m agree behaviors
 --
--- The function says whether two results agree: @(==)@, or for measurements a tolerance. Among the @m@
--- results each agrees with each. As soon as there are @m@ such results, the other behaviours are
--- stopped; and also when there cannot be as many any more, because too few still run: then it fails.
+-- The function says whether two results agree: @(==)@, or for measurements a tolerance. Each of the @m@
+-- results agrees with each other one. As soon as there are @m@ such results, the other behaviours are
+-- stopped. They are stopped, too, when so few still run that there can be no @m@ such results: then it fails.
 --
 -- > agreeing m (\_ _ -> True)     -- any m that succeed
 -- > agreeing 1 (\_ _ -> True)     -- the first that succeeds
@@ -242,8 +242,8 @@ decide choose behaviors =
 --
 -- [Result] @m@ results, in the order of their behaviours; if several choices agree, the leftmost. With
 --   @m <= 0@ none, and nothing is started.
--- [Failure] A 'Behavior.FailedBecause' when no @m@ can agree; with more than there are behaviours,
---   at once. A behaviour's own failure only makes it one less.
+-- [Failure] A 'Behavior.FailedBecause' when no @m@ results can agree any more; at once, if @m@ is greater
+--   than the number of behaviours. A behaviour that fails only gives no result.
 -- [Fault] The leftmost fault of all, in a cleanup too, is always thrown. What the function throws is
 --   thrown.
 -- [Cancellation] Requests the stop of all together; returns after all have ended.
@@ -272,7 +272,7 @@ agreeing m agree behaviors = decide choose behaviors
    where
     known = [a | Just (Right a) <- ends]
     running = length (filter isNothing ends)
-  -- The leftmost n of these results among which each agrees with each.
+  -- The leftmost n of these results that all agree with each other.
   among n results
     | n <= 0 = Just []
     | otherwise = case results of
@@ -301,8 +301,8 @@ refilled container = snd . flip (mapAccumL next) container
   next (a : as) _ = (as, a)
   next [] _ = error "refilled: there are fewer elements than places"
 
--- | Starts behaviours from left to right, in branches that are numbered from 1; the function is given a branch's
--- number, and is part of the transaction that publishes how it ended.
+-- | Starts behaviours from left to right, in branches that are numbered from 1. What the function gives for a
+-- branch's number and outcome is part of the transaction that publishes that outcome.
 --
 -- In constant stack: after each start GHC may run another thread, and before that it traverses
 -- the whole stack of this one.

@@ -19,19 +19,19 @@ import Behavior.Internal.Seam.Runtime (Placement (..))
 -- > pinned act  =  firstOf [act]
 --
 -- With several capabilities (@+RTS -N@) GHC moves threads from one to the other, and an operator
--- and its branches then wake each other from different processors. A reaction takes ten times as long,
--- and now and then some milliseconds. In @pinned@ it takes as long as with one capability.
+-- and its branches then wake each other from different processors. A reaction then takes ten times as long,
+-- and sometimes a few milliseconds. In @pinned@ it takes as long as with one capability.
 --
 -- A branch in it that computes without a pause delays all others, by some 20 ms each time that a
--- thread is woken: run such a branch 'unpinned'. What changes the conditions should be a branch of
--- the same behaviour, or a thread that is pinned to the same capability.
+-- thread is woken: run such a branch 'unpinned'. The thread that changes the conditions should be a
+-- branch of the same behaviour, or be pinned to the same capability.
 --
 -- > main = runBehavior . pinned $ driver ||| unpinned planner ||| mission
 --
 -- [Result, failure, fault, cancellation] Those of the behaviour, which runs in a branch.
 --
--- What a pinned thread starts by an operator is pinned, too; so the operators that are called in a
--- thread of 'Control.Concurrent.forkOn' stay on its capability without this function.
+-- The branches that a pinned thread starts are pinned, too. So operators that are called in a thread of
+-- 'Control.Concurrent.forkOn' stay on its capability without this function.
 --
 -- It has no effect in a simulation, with one capability, and without @-threaded@. If
 -- 'Control.Concurrent.setNumCapabilities' takes the capability away, GHC moves all of these threads

@@ -39,7 +39,7 @@ import Behavior.Internal.Seam.Runtime (now, sleep, sleepUntil)
 -- > zipWith (*) jitter (take 6 (iterate (* 2) 1)) -- jitter: random factors, of the package random
 --
 -- [Result] That of the first try that succeeds.
--- [Failure] That of the last try, as it is. To give up at some failures: 'retryingWith'.
+-- [Failure] That of the last try, as it is. To give up at certain failures: 'retryingWith'.
 -- [Fault, cancellation] Pass through at once.
 --
 -- It runs in constant space. A delay that is negative or NaN is refused when it is due, with an
@@ -61,9 +61,9 @@ retrying = retryingWith (\_ -> pure ())
 -- > retryingWith report []       act  =  act
 -- > retryingWith report (d : ds) act  =  fallbackWith act (\why -> report why >> sleep d >> retryingWith report ds act)
 --
--- What that behaviour throws is thrown. The last failure is thrown, and not given to it.
+-- What that behaviour throws is thrown. The failure of the last try is thrown, and not given to it.
 --
--- Again only if it took too long:
+-- To try again only if it took too long:
 --
 -- >>> tooLong why = isJust (fromException (toException why) :: Maybe TimedOut)
 -- >>> retryingWith (\why -> unless (tooLong why) (throwIO why)) [1, 1] (failWith "no such device")
@@ -111,11 +111,11 @@ every seconds act = do
 --
 -- > sleepForever  =  forever (sleep (1 / 0))
 --
--- What runs until something else ends it, as a branch or a task that only its operator stops. (With
--- @atomically retry@ GHC may take the thread for deadlocked, and throw
--- 'Control.Exception.BlockedIndefinitelyOnSTM' to it and to those that wait for it. This it never
--- takes for that.) A simulation in which nothing else can ever run again ends with a deadlock, which
--- names it as waiting for the end of its sleep; with "Behavior.Sim"'s @endingAt@ it ends then.
+-- Use it for a branch, or a task, that only its operator stops. (GHC may take a thread in
+-- @atomically retry@ for deadlocked, and throw 'Control.Exception.BlockedIndefinitelyOnSTM' to it and to
+-- the threads that wait for it; a thread in @sleepForever@ never.) A simulation in which nothing else can
+-- ever run again ends with a deadlock, whose report says that this thread waits for the end of its sleep;
+-- with an end time (@endingAt@ of "Behavior.Sim"), too.
 --
 -- >>> sleepForever ||| putStrLn "beep"
 -- beep

@@ -32,11 +32,11 @@ import Behavior.Internal.Seam.Runtime (atomically)
 -- > resumable left act  =  readTVarIO left >>= \\xs -> for_ xs act >> atomically (writeTVar left [])
 -- >   -- if nothing interrupts it
 --
--- A behaviour that has returned is not run again for its element; one that was interrupted is, from
--- its beginning. (With @act x >> atomically (modifyTVar left tail)@ an interruption can come in
--- between, and the work is done twice.) An operator that is interrupted between the end of its
--- branch and its own return has not returned. A behaviour that swallows its cancellation and returns
--- has returned, and the next element follows, as in every loop.
+-- If the behaviour has returned, it is not run again for that element; if it was interrupted, it is run
+-- again, from its beginning. (With @act x >> atomically (modifyTVar left tail)@ an interruption can come in
+-- between, and the work is done twice.) If the behaviour is an operator that is interrupted after its
+-- branch has ended, but before it has itself returned, then it has not returned. If the behaviour swallows
+-- its cancellation and returns, the next element follows, as in every loop.
 --
 -- [Result] None, when the list is empty. For a patrol without an end, fill it again:
 --   @forever (resumable left visit >> atomically (writeTVar left waypoints))@.
@@ -44,8 +44,8 @@ import Behavior.Internal.Seam.Runtime (atomically)
 -- [Cancellation] Passes through; the element stays in the list. The behaviour runs in the caller's
 --   thread and masking state.
 --
--- If an effect outside of variables (a report that is sent) must not be repeated, make it the last step, and
--- mask it; it must not block once it has happened. Then nothing comes between it and the commit:
+-- If an effect outside of variables (a report that is sent) must not be repeated, make it the last step, mask
+-- it, and do nothing that blocks after it. Then nothing comes between the effect and the removal of the element:
 --
 -- > mask $ \restore -> resumable left (\x -> restore (driveTo x) >> report x)
 --
@@ -68,17 +68,18 @@ import Behavior.Internal.Seam.Runtime (atomically)
 resumable :: TVar [a] -> (a -> Behavior ()) -> Behavior ()
 resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
 
--- | 'resumable' with the progress kept by key: of each order, say, the steps that are left.
+-- | 'resumable' with the progress kept by key: for each order, say, the steps that are left.
 --
 -- > resumableFor progress key steps act
 -- >   -- as resumable on a variable that holds steps at first, and that is found by its key
 --
--- A key that is not in the map has all the steps left, and is added with them; one that is there goes on
--- where it was, whichever robot works on it now, and whatever came in between: an interruption, a failure
--- and a retry. A key stays in the map, also when nothing is left for it, until the transaction that is
--- returned has removed it. Commit that together with what says that the whole is done: then neither is
--- repeated, whatever interrupts it in between. Of an order that is given up, nothing else removes the key (of
--- a message that was begun, and then dropped by a full inbox): do it with @modifyTVar progress (Map.delete key)@.
+-- A key that is not in the map is added, with all the steps; the work for a key that is there goes on
+-- where it was, whichever robot does it now, and whatever came in between: an interruption, a failure
+-- and a retry. A key stays in the map, even when no step is left, until the transaction that is
+-- returned has removed it. Commit that transaction together with the one that marks the whole as done: then
+-- no step is repeated, whatever interrupts the work. Nothing else removes the key of an order that is given up
+-- (a message that was begun, and then dropped by a full inbox): do that with
+-- @modifyTVar progress (Map.delete key)@.
 --
 -- > handleNext orders (\order -> resumableFor progress (number order) (steps order) carryOut)
 -- > resumableFor progress key steps act >>= atomically     -- if nothing else says so
@@ -86,9 +87,8 @@ resumable left = goOn (readTVar left) (modifyTVar left (drop 1))
 -- [Result] A transaction that removes the key.
 -- [Failure, fault, cancellation] As in 'resumable', which also says how to have an effect only once.
 --
--- Two behaviours must not work on one key at the same time. The steps that are given are looked at
--- only when the key is not in the map: an order goes on with the steps with which it began. It runs in
--- constant space.
+-- Two behaviours must not work on one key at the same time. The given steps are used only when the key is
+-- not in the map: an order goes on with the steps with which it began. It runs in constant space.
 --
 -- >>> progress <- newTVarIO (Map.empty :: Map.Map Int [String])
 -- >>> tries <- newTVarIO (0 :: Int)
@@ -113,8 +113,8 @@ resumableFor progress key steps act = do
   goOn (Map.findWithDefault [] key <$> readTVar progress) (modifyTVar progress (Map.adjust (drop 1) key)) act
   pure (modifyTVar progress (Map.delete key))
 
--- | Runs the behaviour for each element that is left, and removes it. The transactions read what is
--- left, and remove the first element.
+-- | Runs the behaviour for each element that is left, and removes the element. The first transaction reads
+-- what is left, the second removes the first element.
 goOn :: STM [a] -> STM () -> (a -> Behavior ()) -> Behavior ()
 goOn left removeFirst act = again
  where
@@ -122,6 +122,6 @@ goOn left removeFirst act = again
     atomically left >>= \case
       [] -> pure ()
       next : _ -> do
-        -- Masked, so that nothing comes between its return and the commit, which forces nothing.
+        -- Masked, so that nothing comes between the return and the removal. (That evaluates no element.)
         mask $ \restore -> restore (act next) >> atomically removeFirst
         again

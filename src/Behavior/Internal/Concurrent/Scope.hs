@@ -77,7 +77,7 @@ import Behavior.Internal.Spans.Span (operatorSpan)
 -- | What an operator has started.
 data Scope = Scope
   { operator :: String
-  -- ^ Its name, which labels, spans and causes have.
+  -- ^ Its name, for labels, spans and causes.
   , branches :: {-# UNPACK #-} !(IORef [SomeBranch])
   -- ^ The newest first. Only the operator's own thread starts, stops and forgets them.
   }
@@ -200,7 +200,7 @@ data Starting a = Starting
   -- ^ Part of the transaction that publishes how the branch ended.
   }
 
--- | Where GHC moves it, and with no hook.
+-- | Placed like the thread that starts it, and with no hook.
 plainly :: Starting a
 plainly = Starting {placement = Inherited, hook = \_ -> pure ()}
 

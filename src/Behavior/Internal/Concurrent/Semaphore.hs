@@ -23,13 +23,13 @@ import Behavior.Internal.Seam.Runtime (atomically)
 --
 -- [Result, failure, fault] Of the behaviour, which runs in the caller's thread and masking state. The
 --   unit is given back after the behaviour has ended, cleanup included.
--- [Cancellation] Passes through. It can come while the caller waits for the unit, even if that is
+-- [Cancellation] Passes through. It can come while the caller waits for the unit, even if the caller is
 --   masked; then nothing has been taken. Giving the unit back never blocks, and so nothing interrupts it.
 --
--- Of several that wait, any may come next. One that holds the only unit and waits for it again, waits for
--- ever. A robot that is to wait for only so long, and then to work as long as it takes, notes in the
--- transaction that takes the unit that it has it. (With @bracket_ (timeout 5 ...)@ a unit would be lost that
--- is given as the robot is cancelled.)
+-- If several wait, any of them may come next. A behaviour that holds the only unit, and waits for another one,
+-- waits for ever. To limit the wait for the unit, but not the work, note in the transaction that takes the unit
+-- that it was taken. (With @bracket_ (timeout 5 ...)@ a unit that is taken as the robot is cancelled would be
+-- lost.)
 --
 -- > do held <- newTVarIO False
 -- >    let obtain = atomically (waitTSem semaphore >> writeTVar held True)

@@ -177,8 +177,8 @@ failWith :: MonadThrow m => String -> m a
 failWith = throwM . FailedBecause
 
 -- | Turns chosen faults into failures, at the edge where an action meets the
--- hardware: @failingOn chosen act@ is @act@, but where @act@ throws an @e@ that is
--- @chosen@, it fails with that @e@ inside a 'BehaviorFailed'.
+-- hardware: @failingOn chosen act@ is @act@; but if @act@ throws an @e@ for which
+-- @chosen@ is true, it fails with that @e@ inside a 'BehaviorFailed'.
 --
 -- A failure stays as it is, and an asynchronous exception is never turned into a
 -- failure, whatever the type @e@. Like '?' it decides by the exception's type, in the
@@ -212,7 +212,7 @@ isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 trySynchronous :: IO a -> IO (Either SomeException a)
 trySynchronous act = (Right <$> act) `catchSynchronous` (pure . Left)
 
--- | Handles whatever the action throws, but not a cancellation.
+-- | Handles whatever the action throws, except a cancellation.
 catchSynchronous :: IO a -> (SomeException -> IO a) -> IO a
 catchSynchronous act handler = act `catch` \e -> if isCancellation e then throwIO e else handler e
 
@@ -335,9 +335,9 @@ attempt n act
 -- > tryAny (pure a)     =  pure (Right a)
 -- > tryAny (throwIO e)  =  pure (Left (toException e))  -- unless e is asynchronous
 --
--- A cancellation passes through. An exception is one if its type is: every exception under
--- 'SomeAsyncException', and no other, whichever thread threw it. So an exception of a synchronous
--- type that another thread throws to the caller counts as the behaviour's own.
+-- A cancellation passes through. Only the type of an exception decides whether it is one: every
+-- exception under 'SomeAsyncException' is, and no other, whichever thread threw it. So an exception of a
+-- synchronous type that another thread throws to the caller counts as the behaviour's own.
 --
 -- Use it where a fault must not end the program (around each of many missions, say). For
 -- failures use '?'.
@@ -349,12 +349,12 @@ attempt n act
 tryAny :: Behavior a -> Behavior (Either SomeException a)
 tryAny = trySynchronous
 
--- | Runs a behaviour, and the second with the failure or fault that it threw.
+-- | Runs a behaviour; if it throws a failure or fault, runs the handler with that.
 --
 -- > catchAny act handler  =  tryAny act >>= either handler pure
 --
--- A cancellation passes through, by the same rule as in 'tryAny'. The second runs in the
--- caller's own masking state, outside of any exception handler, where it can be
+-- A cancellation passes through, by the same rule as in 'tryAny'. The handler runs in the
+-- caller's own masking state, and not inside an exception handler of GHC: so it can be
 -- interrupted. What it throws is thrown.
 --
 -- >>> catchAny (readFile "/no/such/map") (\_ -> pure "an empty map")

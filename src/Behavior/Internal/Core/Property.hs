@@ -37,8 +37,8 @@ data Property = Property
   }
   deriving (Eq)
 
--- | The properties by the numbers of their threads. (A thread that is kept here could not be found to be
--- blocked for ever.)
+-- | The properties by the numbers of their threads. (If the threads themselves were kept here, GHC could not find
+-- them deadlocked.)
 properties :: IORef (IntMap Property)
 properties = unsafePerformIO (newIORef IntMap.empty)
 {-# NOINLINE properties #-}
@@ -61,13 +61,13 @@ keepMistake this e = atomicModifyIORef' (mistake this) (\old -> (old `mplus` Jus
 mistakeOf :: Property -> IO (Maybe SomeException)
 mistakeOf = readIORef . mistake
 
--- | Keeps, of what a claim presupposes, in words, whether it has come.
+-- | Keeps the premises of a claim, in words, each with whether it has come.
 keepPremises :: Property -> [(String, Bool)] -> IO ()
 keepPremises this these = do
   new <- evaluate (Map.fromListWith (||) these)
   atomicModifyIORef' (premises this) (\old -> (Map.unionWith (||) old new, ()))
 
--- | What its claims presuppose, and whether it has come.
+-- | The premises of its claims, each with whether it has come.
 premisesOf :: Property -> IO (Map String Bool)
 premisesOf = readIORef . premises
 

@@ -4,8 +4,8 @@
 -- |
 -- Texts that the user's code computes.
 --
--- What computing them throws, of whatever type, is shown. They are evaluated masked, so that nothing else is
--- taken for that: what is thrown to the thread meanwhile is received afterwards. (So a text that neither
+-- If computing a text throws, of whatever type, that is shown in the text. Texts are evaluated masked, so that an
+-- exception of another thread is not taken for the text's: it is received afterwards. (So a text that neither
 -- ends nor grows cannot be interrupted.)
 --
 -- Internal: any of it may change in any release.
@@ -28,8 +28,8 @@ safeShow text = case evaluated text of
   evaluated :: a -> Maybe a
   evaluated a = orElseWhenItThrows (Just <$> evaluate a) (pure Nothing)
 
--- | The text, wholly evaluated, and cut if it is long: whatever the user's code does, it can be compared and
--- written. What computing it throws is named, as by 'safeShow'.
+-- | The text, wholly evaluated, and cut if it is long: whatever the user's code does, the result can be compared
+-- and written. If computing it throws, it is as of 'safeShow'.
 settledText :: String -> String
 settledText text = orElseWhenItThrows (whole text) (whole (safeShow text))
  where

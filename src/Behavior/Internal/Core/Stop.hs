@@ -42,7 +42,7 @@ isStopOf thread e = case fromException e of
   Just (Stop target _) -> target == thread
   Nothing -> False
 
--- | Why what was ended by this exception was stopped.
+-- | Why a behaviour was stopped, given the exception that ended it.
 causeOf :: SomeException -> Cause
 causeOf e
   | Just (Stop _ cause) <- fromException e = cause

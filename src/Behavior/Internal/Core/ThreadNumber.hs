@@ -5,8 +5,8 @@
 {-# LANGUAGE UnliftedFFITypes #-}
 
 -- |
--- The numbers of threads. (GHC's interpreter cannot call the function for it: so this module is always
--- compiled.)
+-- The numbers of threads. (GHC's interpreter cannot call the foreign function that gives them: so this module is
+-- always compiled.)
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Core.ThreadNumber
@@ -21,7 +21,7 @@ import GHC.Conc (ThreadId (..))
 import GHC.Exts (ThreadId#)
 #endif
 
--- | A number that no other thread has that lives at the same time.
+-- | A number that no other thread has at the same time.
 threadNumber :: ThreadId -> Int
 #if MIN_VERSION_base(4,19,0)
 threadNumber = fromIntegral . fromThreadId

@@ -58,12 +58,12 @@ data Claim = Claim
   { claimWords :: String
   , claimNeeds :: [Need]
   , premises :: [Premise]
-  -- ^ What has to come, or it holds whatever happens.
+  -- ^ What has to come, or the claim holds whatever happens.
   , violation :: Record -> Origin -> Maybe Violation
-  -- ^ How it does not hold for the entries after the origin, if so.
+  -- ^ How the claim is violated by the entries after the origin, if it is.
   }
 
--- | How a claim does not hold.
+-- | Why a claim does not hold, and the lines that show it.
 data Violation = Violation
   { broken :: String
   -- ^ The claim; of several that are joined, the one that does not hold.
@@ -94,7 +94,7 @@ eventually = withinSeconds (1 / 0)
 -- or under 'whenever' from that moment on. A negative number or NaN is rejected with an
 -- 'Control.Exception.ErrorCall'.
 --
--- A run that ends before the limit is no excuse: what has not come when it ends never came. (A claim
+-- This is so even if the run ends before the limit: what has not come by then never came. (A claim
 -- that held because the run was cut would show nothing.) So let the run last longer than the limit.
 --
 -- >>> check (whenever (becoming "low" True) (withinSeconds 0.5 (startOf "charge")))
@@ -167,13 +167,13 @@ always s = simple ("always " ++ intervalWords s) (intervalNeeds s) [] $ \record 
         (instant, word, t) : _ ->
           Just ("it was not so " ++ word ++ " " ++ inSeconds t, take 1 (reverse (takeWhile ((<= instant) . at) rows)))
  where
-  -- The entries that the set-up of the world makes: not everything exists yet.
+  -- An entry that the set-up of the world makes: then not everything exists yet.
   isInitial entry = case entryKind entry of
     Is _ -> True
     _ -> False
 
 -- | The second does not happen before the first has happened: @startOf "look" \`comesBefore\`
--- startOf "cross"@. It holds when the second never happens.
+-- startOf "cross"@. The claim holds if the second never happens.
 --
 -- >>> check (startOf "charge" `comesBefore` endOf "drive")
 -- This does not hold: "charge" begins before "drive" ends.
@@ -198,7 +198,7 @@ comesBefore a b = simple text (momentNeeds a ++ momentNeeds b) [premiseOf b] $ \
 
 infix 7 `comesBefore`
 
--- | Each time that it happens, the claim holds for what comes after.
+-- | Each time that the moment comes, the claim holds for what comes after it.
 --
 -- > whenever (becoming "low" True) (eventually (startOf "charge"))
 -- > whenever (becoming "low" True) (withinSeconds 2 (startOf "charge"))
@@ -247,8 +247,8 @@ holds claim = either (const False) (const True) . verdict claim
 
 -- | Why a claim does not hold, with the lines of the record that show it.
 --
--- A claim about a name that is unknown, or of something that never does this, does not hold; otherwise
--- a mistake would make 'never' true.
+-- A claim about an unknown name, or about something that can never do what the claim says, does not hold;
+-- otherwise a typo would make 'never' hold.
 --
 -- >>> check (never (startOf "chrage"))
 -- This does not hold: never "chrage" begins.
@@ -257,8 +257,8 @@ holds claim = either (const False) (const True) . verdict claim
 -- This does not hold: never "low" begins.
 -- "low" is a condition, and never begins. The actions of this world: "drive", "charge".
 --
--- (The argument of an action may be any, and one that is misspelt is not noticed; but one that is written
--- otherwise than it is shown is, in a record that has it: @open front@ instead of @open "front"@.)
+-- (An action can have any argument, so a misspelt one is not noticed. But if the record has an argument that the
+-- claim only writes in another way, that is noticed: @open front@ instead of @open "front"@.)
 --
 -- @since 0.1.0.0
 verdict :: Claim -> Record -> Either String ()

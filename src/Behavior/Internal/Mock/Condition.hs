@@ -121,8 +121,8 @@ due c hasCome = do
   pure (foldl (\_ (_, to) -> to) old passed, others, made)
 
 -- | Reads the time, makes the changes that are due and runs the transaction, in one
--- step. The transaction gets the time at which the world began and the current time; it
--- must not block, so that, masked, nothing interrupts it before all is recorded.
+-- step. The transaction is given the time at which the world began and the current time. It
+-- must not block: this runs masked, so that nothing interrupts it before all is recorded.
 upToDate :: Condition a -> (Seconds -> Seconds -> STM (b, [RecordEntry])) -> IO b
 upToDate c transaction = do
   (zero, t) <- clock (world c)

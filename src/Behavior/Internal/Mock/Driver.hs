@@ -26,13 +26,13 @@ import Behavior.Internal.Seam.Runtime
 -- 'Behavior.Message.withInbox': it takes the callback, and returns the action that ends the
 -- subscription.
 --
--- The times are zero or more, and do not decrease. A subscription delivers what is due after it has
--- begun (on real threads, not what is due at 0, if the clock has been started before), from a thread
--- of its own. The record has a note for each message and for the subscription's
+-- The times are zero or more, and do not decrease. A subscription delivers, from a thread of its own, the
+-- messages that are due from its beginning on. (So on real threads it does not deliver a message for time 0, if
+-- the clock was started before.) The record has a note for each message and for the subscription's
 -- beginning and end: @orders: \"tea\"@, @orders: subscribed@, @orders: unsubscribed@.
 --
 -- Times that decrease, or a name that is already used in this world, are rejected with an
--- 'Control.Exception.ErrorCall'. What the callback throws, the end of the subscription throws.
+-- 'Control.Exception.ErrorCall'. If the callback throws, the action that ends the subscription throws the same.
 --
 -- >>> orders <- driver mock "orders" [(0.001, "tea"), (0.002, "milk")]
 -- >>> withInbox 10 orders $ \inbox -> (,) <$> atomically (receive inbox) <*> atomically (receive inbox)

@@ -1,8 +1,8 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Intervals: what claims are about that has a start and an end. And what moments and intervals have in common: lines
--- and instants of a record.
+-- Intervals: the subjects of claims that have a start and an end. And what moments and intervals have in common:
+-- lines and instants of a record.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Interval
@@ -72,8 +72,8 @@ data Range = Range
   -- ^ The line that shows its start, at the time of the start.
   }
 
--- | An instant in a record: the time; whether it is before or after all that happens at that time, or at
--- the entry with the given number.
+-- | An instant in a record: a time; whether it is before all that happens at that time, at an entry, or after
+-- all; and the number of that entry.
 data Instant = Instant Seconds Side Int
   deriving (Eq, Ord)
 
@@ -121,9 +121,9 @@ rangesFrom begins ends record =
   rows = numbered record
   openEnd = Instant (1 / 0) After 0
 
--- | Only after it has been going on for the given number of seconds: so what happens at the moment of its
--- start, or shortly after it, does not count. A negative number or NaN is rejected with an
--- 'Control.Exception.ErrorCall'.
+-- | The same interval, but it begins only when it has been going on for the given number of seconds: so what
+-- happens at the moment of its start, or shortly after it, does not count. A negative number or NaN is rejected
+-- with an 'Control.Exception.ErrorCall'.
 --
 -- >>> holds (never (running "drive" `overlapping` being "low" True)) record
 -- False
@@ -178,7 +178,7 @@ numbered = zip [0 ..] . recordEntries
 isAbout :: RecordEntry -> String -> Bool
 isAbout entry name = name `elem` [entrySubject entry, fullName entry]
 
--- | Whether an action ends so.
+-- | Whether an entry of this kind is the end of an action.
 isEnd :: EntryKind -> Bool
 isEnd kind = case kind of
   Succeeds -> True

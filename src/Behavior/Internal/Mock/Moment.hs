@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- Moments: what claims are about that takes no time; also with regard to intervals.
+-- Moments: the subjects of claims that take no time; also moments inside or outside of an interval.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Moment
@@ -50,7 +50,7 @@ data Moment = Moment
   { momentWords :: String
   , momentNeeds :: [Need]
   , momentPremises :: [Premise]
-  -- ^ What has to come, or there can be none.
+  -- ^ What has to come, or there can be no such entry.
   , occurrences :: Record -> [Line]
   -- ^ In order.
   }
@@ -100,8 +100,8 @@ interruptionOf :: String -> Moment
 interruptionOf = momentOf anyAction "is interrupted" (== StopRequested)
 
 -- | The condition, or the value that the sensor reads, becomes this, or is this from the
--- start. The record has values as they are shown: so a value of another type is one that never comes. (If the
--- record has it in the other type, as @5.0@ and not @5@, that is an error.)
+-- start. The record has values as they are shown: so a value of another type never comes. (If the record has
+-- the same value as another type shows it, @5.0@ for @5@, that is an error.)
 --
 -- @since 0.1.0.0
 becoming :: Show a => String -> a -> Moment
@@ -112,8 +112,8 @@ becoming name value =
  where
   shown = show value
 
--- | This text was recorded by 'Behavior.Sim.Mock.note', or by a 'Behavior.Sim.Mock.driver'. It may be any
--- text: one that nothing notes never comes. (If the record has it with other quotes, that is an error.)
+-- | This text was recorded by 'Behavior.Sim.Mock.note', or by a 'Behavior.Sim.Mock.driver'. Any text is allowed:
+-- one that nothing notes never comes. (If the record has the same text with other quotes, that is an error.)
 --
 -- @since 0.1.0.0
 noted :: String -> Moment

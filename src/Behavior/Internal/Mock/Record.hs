@@ -30,8 +30,8 @@ data Record = Record
   -- ^ Everything in the world by its name, including what has no entry.
   , recordEntries :: [RecordEntry]
   , recordEnd :: Seconds
-  -- ^ The time at which it ends: when the simulated run has ended, or if that goes on, now; on real
-  -- threads the time of the last entry.
+  -- ^ The time at which the record ends: in a simulation the end of the run, or the current time while the run
+  -- goes on; on real threads the time of the last entry.
   }
   deriving (Eq)
 
@@ -125,7 +125,7 @@ inSeconds s
   | abs s < 1e9 = show (fromInteger (round (s * 1000000)) / 1000000 :: Seconds) ++ " s"
   | otherwise = show s ++ " s"
 
--- | Why the first of the needs that does not fit the record does not, if there is one.
+-- | If one of the needs does not fit the record: why the first such need does not.
 unfitIn :: Record -> [Need] -> Maybe String
 unfitIn record = unfit (recordSubjects record) (mapMaybe shown (recordEntries record))
  where

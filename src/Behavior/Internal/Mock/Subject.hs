@@ -43,10 +43,10 @@ kindName kind = case kind of
   ACondition -> "condition"
   ADriver -> "driver"
 
--- | What a claim needs.
+-- | What a claim needs of the world.
 data Need
-  = -- | Something of this name, which does what the verb says: so it is of one of these kinds; and the value that
-    -- the verb names, as it is shown.
+  = -- | Something with this name; a verb, for what it does; the kinds of subjects that can do that; and the value
+    -- that the verb names, if it does, as it is shown.
     Need String String [SubjectKind] (Maybe String)
   | -- | A note, of any text.
     Noting String
@@ -55,7 +55,7 @@ data Need
 anyAction :: [SubjectKind]
 anyAction = [AnAction, AnActionOn]
 
--- | Why the first of the needs that does not fit the world does not, if there is one: a claim with it
+-- | If one of the needs does not fit the world: why the first such need does not. A claim with it
 -- would be about nothing, so that 'Behavior.Sim.Mock.never' would hold whatever happened.
 --
 -- >>> let world = [("low", ACondition), ("drive", AnAction), ("open", AnActionOn)]
@@ -69,8 +69,9 @@ anyAction = [AnAction, AnActionOn]
 -- >>> whyNot "drvie"
 -- Nothing in this world is called "drvie", only "low", "drive", "open".
 --
--- It is not known which arguments, values and notes there are. But one that was, as it is shown with the name of its
--- action, condition or sensor (of a note: @""@), and is written in another way, is an error too:
+-- Which arguments, values and notes there can be is not known. But if the need writes one that was recorded in
+-- another way, that is an error, too. (The second list has those that were recorded, as they are shown, each with the
+-- name of its action, condition or sensor; a note with @""@.)
 --
 -- >>> whyNot "open front"
 -- "open" was not called as "open front", but as "open \"front\"".
@@ -100,7 +101,8 @@ unfit world shown = listToMaybe . mapMaybe unfitNeed
     [ show name ++ " was not recorded as " ++ given ++ ", but as " ++ value ++ "."
     | value <- otherSpellings rewrites given name
     ]
-  -- What was shown with this name, and is what is given in another spelling; unless that was shown too.
+  -- What was recorded with this name and is the given text in another spelling; nothing, if the given text itself was
+  -- recorded.
   otherSpellings isLike given name = if given `elem` these then [] else filter (given `isLike`) these
    where
     these = [text | (known, text) <- shown, known == name]
@@ -115,12 +117,12 @@ unfit world shown = listToMaybe . mapMaybe unfitNeed
   negated verb = maybe ("never " ++ verb) ("is never " ++) (stripPrefix "is " verb)
   listed = intercalate ", " . map show
 
--- | Whether a name is that of the subject; of an action with an argument also with an argument.
+-- | Whether the subject has this name; an action with an argument also has its name with any argument.
 isCalled :: (String, SubjectKind) -> String -> Bool
 isCalled (known, kind) name =
   known == name || (kind == AnActionOn && any (any (/= ' ')) (stripPrefix (known ++ " ") name))
 
--- | Whether the first is the second, as it is shown, with other quotes, brackets or blanks.
+-- | Whether the two differ only in quotes, brackets or blanks.
 sameWords :: String -> String -> Bool
 given `sameWords` shown = bare given == bare shown && not (null (bare given))
 
@@ -128,8 +130,8 @@ given `sameWords` shown = bare given == bare shown && not (null (bare given))
 bare :: String -> [String]
 bare = words . map (\c -> if c `elem` "\"'()[]{},=" then ' ' else c)
 
--- | Also as a number of another type; or without 'Just'; or without the quotes and the constructor before them.
--- (But of two texts in quotes each is itself.)
+-- | 'sameWords'; or the first is the same number in another type; or it lacks a 'Just'; or it lacks the quotes and
+-- the constructor before them. (But two texts in quotes are never spellings of each other.)
 rewrites :: String -> String -> Bool
 given `rewrites` shown =
   not (all ((== "\"") . take 1) [given, shown]) && (given `sameWords` shown || isSameNumber || lacksBeginning)

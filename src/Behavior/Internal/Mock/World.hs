@@ -3,9 +3,9 @@
 -- |
 -- A mock world, and the record of what happens there.
 --
--- To record an entry is not an operation of the seam, but to read the time is. So the
--- entry that is recorded right after reading the time, and what is done right after
--- that, belong to the same step of a simulation.
+-- To record an entry is not an operation of the seam; to read the time is one. So reading the time,
+-- recording an entry right after that, and what is done right after the entry, are one step of a
+-- simulation.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.World
@@ -53,9 +53,9 @@ import Behavior.Internal.Seam.Runtime
 data Mock = Mock
   { beginning :: IORef (Maybe Beginning)
   , madeIn :: Maybe Property
-  -- ^ Of an exploration.
+  -- ^ The property of an exploration that made the world.
   , misuse :: IORef (Maybe ErrorCall)
-  -- ^ The error of a use in another run than its own: that run may have lost it.
+  -- ^ The error of a use in a run that is not the world's own. (It was thrown in that run, which may have caught it.)
   , subjects :: IORef [(String, SubjectKind)]
   -- ^ Newest first.
   , newestEntries :: IORef [RecordEntry]
@@ -88,9 +88,9 @@ newMock =
 --
 -- > simulate (begin world >> mission)
 --
--- [Fault] To use it in another run throws an 'ErrorCall', there and where its record is read; in an exploration
---   also to use it outside of the simulation. (The record itself can be read everywhere: 'happened',
---   'shouldRecord'.)
+-- [Fault] If it is used in another run, that throws an 'ErrorCall', and so does reading its record later. In an
+--   exploration its use outside of the simulation throws one, too. (Only the record may be read everywhere:
+--   'happened', 'shouldRecord'.)
 --
 -- >>> begin mock
 -- >>> run <- simulate (begin mock)
@@ -110,8 +110,8 @@ clock mock = do
   here <- simulatedRun
   goesOn <- isRecorded
   property <- ownProperty mock
-  -- Neither starts the clock: what is unwound after the end of a run, and what is outside of the simulation
-  -- that a property runs.
+  -- Two kinds of uses do not start the clock: those after the end of a run, while it is unwound; and those outside of
+  -- the simulation that a property runs.
   let first = Beginning (fst <$> here) t (maybe (pure 0) (fmap (subtract t) . snd) here)
       begins = goesOn && (isJust here || isNothing property)
       refuse why = writeIORef (misuse mock) (Just (ErrorCall why)) >> mistake property why
@@ -206,9 +206,9 @@ checkTimes mayFollow rule times = for_ (zip (Nothing : map Just times) (take 100
 -- >>> map entryKind . recordEntries <$> happened mock
 -- [Begins,Succeeds]
 --
--- [Fault] Throws the 'ErrorCall' again, if the world was used in a run that it does not belong to (see
---   'begin'); one, if nothing has used the world: then there is no record, and not an empty one; and in an
---   exploration one, if the world was made for another schedule.
+-- [Fault] Throws an 'ErrorCall' if the world was used in a run that it does not belong to (see 'begin'); if
+--   nothing has used the world (then there is no record, not even an empty one); and, in an exploration, if the
+--   world was made for another schedule.
 --
 -- @since 0.1.0.0
 happened :: Mock -> IO Record
@@ -235,9 +235,9 @@ happened mock = do
 --
 -- [Fault] Throws an 'ErrorCall' if there is no record ('happened').
 --
--- In an exploration a claim that does not hold fails the property, also if it was checked inside of the run, and
--- whatever catches the exception there. And it is kept whether that has come without which the claim holds
--- whatever happens ('Behavior.Sim.reportNeverCame').
+-- In an exploration a claim that does not hold fails the property, even if it was checked inside of the run, and
+-- something there catches the exception. And the report says if what the claim presupposes has never come
+-- ('Behavior.Sim.reportNeverCame').
 --
 -- >>> begin mock
 -- >>> mock `shouldRecord` eventually (noted "all is well")

@@ -12,7 +12,7 @@
 -- (A) While there are runs, all of them receive the signal.
 --
 -- (B) When there is no run any more, the handler that was installed before the first run is called, or the
---     signal raised again for it.
+--     signal is raised again for that handler.
 --
 -- (C) A signal whose handler GHC has not yet called is dropped if that handler is replaced by
 --     the default. So where the default was installed before, this handler stays installed,
@@ -21,9 +21,9 @@
 -- (D) GHC calls no handler while a loop that never allocates keeps it from running other threads.
 --     Then the second signal ends the process (in @signals.c@).
 --
--- (E) The program may end before GHC has called a handler. So a run that ends waits until those of
---     the signals before have been called (at most a second), and when there is no run any more, the
---     default is done by @signals.c@, at once.
+-- (E) The program may end before GHC has called a handler. So a run that ends waits (at most a second) until
+--     the handlers of all signals that have come have been called; and when there is no run any more,
+--     @signals.c@ does the default, at once.
 --
 -- Two things are special about SIGHUP. Where it is ignored when the first run begins (by nohup),
 -- it stays ignored. And when a terminal is closed, the shell and the kernel send one each: at the

@@ -34,7 +34,7 @@ data Response a
   | -- | End the operator: for this cause, or because the signal has this value.
     Conclude (Maybe Cause) (IO a)
 
--- | The name of the branch that it starts.
+-- | The name of the branch that the response starts.
 branchOf :: Response a -> Maybe String
 branchOf = \case
   Run name _ -> Just name
@@ -52,7 +52,7 @@ data Engine k a = Engine
   , observer :: Observer
   }
 
--- | What wakes the operator, if it is not the end of its branch.
+-- | What wakes the operator, except the end of its branch.
 data Wakeup k a
   = Changed k Values !(Response a)
   | SensorDied SomeException
@@ -96,14 +96,14 @@ readWakeup engine sensors seen value =
     values <- observed (observer engine) (readings seen)
     pure $! Changed k values (response engine k)
 
--- | Why the operator stops what it stops now.
+-- | The cause for which the operator stops its branch, or its sensors, now.
 decidesOn :: Engine k a -> Wakeup k a -> IO Cause
 decidesOn engine = \case
   SensorDied _ -> pure (SiblingFailed "sensor")
   Changed _ _ (Conclude (Just cause) _) -> pure cause
   Changed _ values next -> decides (observer engine) (isReaction next) values
  where
-  -- At the beginning.
+  -- Whether the response is a reaction even to the first values that the operator reads.
   isReaction next = case next of
     RunToEnd _ _ -> True
     Conclude _ _ -> True
@@ -177,8 +177,8 @@ interrupt engine sensors cause name running = \case
       SensorDied _ -> pure ()
     pure (seen, wakeup)
 
--- | Runs the recovery to its end. The sensorBranches stop has been requested: the recovery does not
--- wait for those that are slow to stop, but what comes after it does.
+-- | Runs the recovery to its end. The stop of the sensors has been requested: the recovery does not
+-- wait for sensors that are slow to stop, but what comes after it does.
 recover :: Eq k => Engine k a -> Sensors -> Cause -> String -> Behavior (Next a) -> Maybe (IO a) -> IO (Verdict a)
 recover engine sensors cause name recovery taskOutcome = do
   recovered <- starts (observer engine) name (branch (scope engine) name recovery)
@@ -190,7 +190,7 @@ recover engine sensors cause name recovery taskOutcome = do
     (Right BeginAgain, Nothing) -> do
       forget (scope engine) recovered
       ends <- traverse awaitOutcome sensors
-      -- (What has faulted stays in the scope.)
+      -- (A sensor that has faulted stays in the scope.)
       _ <- forgetEnded (scope engine)
       case [fault | FaultedWith fault <- ends] of
         [] -> startOver engine Reread

@@ -50,8 +50,8 @@ data Inbox e = Inbox
   , queue :: !(TVar (Seq (Message e)))
   -- ^ At most 'capacity' messages; their numbers increase.
   , handling :: !(NonEmpty (TVar Int))
-  -- ^ How many messages are being handled that were taken through this handle of the inbox; and
-  -- through those that it was made from.
+  -- ^ How many messages that were taken through this handle of the inbox are being handled; then the same
+  -- for the handles that this one was made from.
   , nextNumber :: !(TVar Int)
   , droppedCount :: !(TVar Int)
   , isOpen :: !(TVar Bool)
@@ -124,21 +124,20 @@ namedInbox name = namedInboxWith name show
 namedInboxWith :: String -> (e -> String) -> Inbox e -> Inbox e
 namedInboxWith name render inbox = inbox {called = Just (name, render)}
 
--- | Runs the task; whenever a message waits, stops the task, has the message handled, and begins
--- again.
+-- | Runs the task; whenever a message waits, stops the task, handles the message, and begins again.
 --
 -- > onMessage inbox handle task  =  monitor ((> 0) <$> watching (unhandled inbox)) (handleNext inbox handle) task
 -- >   -- if nothing else takes messages from the inbox
 --
--- The handler does what takes time, and returns a transaction. That transaction and the removal of
--- the message are one step: whatever interrupts the handler, each message's transaction is committed
--- /exactly once/ (unless the message is dropped), and the handler's 'IO' before it runs /at least
--- once/: a message whose handler was interrupted, failed or faulted waits again, in its old place (in
--- an inbox that has become full it is the oldest, and is dropped). While it is handled it does not
--- count towards the inbox's capacity.
+-- The handler does the part that takes time, in 'IO', and returns a transaction. That transaction and
+-- the removal of the message are one step. So each message's transaction is committed /exactly once/
+-- (unless the message is dropped), and the handler's 'IO' runs /at least once/, whatever interrupts it.
+-- If the handler was interrupted, failed or faulted, the message waits again, in its old place. (If the
+-- inbox has become full meanwhile, the message is dropped, as the oldest.) While a message is handled
+-- it does not count towards the inbox's capacity.
 --
--- As with 'Behavior.Signal.monitor' the task is stopped first, and restarts from its beginning
--- (what must go on where it was, uses 'Behavior.resumable'). Only the caller can interrupt the
+-- As with 'Behavior.Signal.monitor' the task is stopped first, and restarts from its beginning. (To go
+-- on where it was, use 'Behavior.resumable' in the task.) Only the caller can interrupt the
 -- handler: a message waits for the one before it. The handler's result, failure, fault and
 -- cancellation are those of the recovery in 'Behavior.Signal.monitor'. The transaction is committed
 -- with exceptions masked; while it retries it can be interrupted.
@@ -168,10 +167,10 @@ onMessage inbox handle task = react "onMessage" [False, True] someWait $ \case
 -- > rule <- messageRule inbox handle
 -- > teleoReactive [(danger, flee), rule, (pure True, patrol)]
 --
--- Its condition holds while a message waits or is being handled by this rule. Its behaviour has each
--- message handled, and does not return. What is said of the handler at 'onMessage' holds here too: whatever
--- rule comes before it and interrupts it, each message's transaction is committed exactly once. A rule after
--- it runs when all messages have been handled, or are being handled elsewhere.
+-- Its condition holds while a message waits or is being handled by this rule. Its behaviour handles one
+-- message after the other, and does not return. What is said of the handler at 'onMessage' holds here too:
+-- even if an earlier rule interrupts this one, each message's transaction is committed exactly once. A later
+-- rule runs when all messages have been handled, or are being handled elsewhere.
 --
 -- >>> danger <- newTVarIO True
 -- >>> let orders deliver = pure () <$ for_ ["tea", "milk"] deliver
@@ -187,8 +186,8 @@ onMessage inbox handle task = react "onMessage" [False, True] someWait $ \case
 -- serve milk
 -- patrol
 --
--- (A rule of your own, from 'unhandled' and 'handleNext', ends 'Behavior.Signal.teleoReactive' when a message has
--- been handled, as any rule does that returns.)
+-- (A rule that you make of 'unhandled' and 'handleNext' returns when a message has been handled, and so ends
+-- 'Behavior.Signal.teleoReactive', as every rule that returns does.)
 --
 -- @since 0.1.0.0
 messageRule :: Inbox e -> (e -> Behavior (STM ())) -> Behavior (Signal Bool, Behavior a)
@@ -202,18 +201,18 @@ messageRule inbox handle = do
   inBranch act = structured "messageRule" $ \scope ->
     branch scope "handler" act >>= fmap (endedBy "handler") . atomically . outcome
 
--- | Waits for a message, and has it handled: once.
+-- | Waits for a message, and handles it: one message, once.
 --
 -- > handleNext inbox handle  ~  atomically (receive inbox) >>= handle >>= atomically
--- >   -- but the message is taken by the last of these transactions, whatever interrupts it
+-- >   -- but only the last of these transactions takes the message away for good
 --
 -- [Result] That of the transaction.
 -- [Failure, fault] Of the handler or the transaction: thrown; the message waits again.
 -- [Cancellation] Passes through; the message waits again. The handler runs in the caller's thread
 --   and masking state; the transaction is committed masked, and can be interrupted while it retries.
 --
--- If an effect outside of variables must not be repeated, make it the last step of the handler, and mask it;
--- it must not block once it has happened. Then nothing comes between it and the commit:
+-- If an effect outside of variables must not be repeated, make it the last step of the handler, mask it, and
+-- do nothing that blocks after it. Then nothing comes between the effect and the commit:
 --
 -- > mask $ \restore -> handleNext inbox (\order -> restore (carry order) >> handOver order >> pure (pure ()))
 --
@@ -227,7 +226,7 @@ handleNext :: Inbox e -> (e -> Behavior (STM a)) -> Behavior a
 handleNext inbox handle = mask $ \restore ->
   atomically (tryTake inbox >>= maybe retry pure) >>= handleTaken inbox (restore . handle)
 
--- | Has a message handled that was taken. Call it masked: nothing may come between the taking and
+-- | Handles a message that was taken. Call it masked: nothing may come between the taking and
 -- this, or between the handler's end and the commit.
 handleTaken :: Inbox e -> (e -> Behavior (STM a)) -> Message e -> Behavior a
 handleTaken inbox handle message@(Message _ e) =
@@ -239,9 +238,9 @@ handleTaken inbox handle message@(Message _ e) =
 
 -- | Takes the oldest message; retries while there is none.
 --
--- A behaviour that is interrupted after this has lost the message: 'handleNext' and 'onMessage' do not. So it
--- does not belong into one of ordered rules: when the last message has been taken, the rule's condition no
--- longer holds.
+-- If the behaviour is interrupted after this, the message is lost; with 'handleNext' and 'onMessage' it is not.
+-- So do not use it in the rules of a 'Behavior.Signal.teleoReactive': when the last message has been taken, the
+-- rule's condition no longer holds.
 --
 -- @since 0.1.0.0
 receive :: Inbox e -> STM e
@@ -250,7 +249,7 @@ receive inbox = takeOldest inbox >>= maybe retry (\(Message _ e) -> pure e)
 -- | How many messages are not handled yet: those that wait, and those that are being handled until their
 -- transaction is committed. (What was taken by 'receive', or dropped, does not count.)
 --
--- > waitUntil ((== 0) <$> watching (unhandled inbox))     -- all has been handled
+-- > waitUntil ((== 0) <$> watching (unhandled inbox))     -- all messages have been handled
 --
 -- >>> let orders deliver = pure () <$ for_ ["tea", "milk"] deliver
 -- >>> withInbox 10 orders $ \inbox -> handleNext inbox (\_ -> pure <$> atomically (unhandled inbox))
@@ -264,7 +263,7 @@ unhandled inbox = (+) <$> queued inbox <*> readTVar (NonEmpty.head (handling inb
 queued :: Inbox e -> STM Int
 queued inbox = Seq.length <$> readTVar (queue inbox)
 
--- | The number of messages as a signal, whose name says which: of this inbox, those that are so.
+-- | A number of messages as a signal. Its name in a trace is that of the inbox, with a word for which they are.
 counting :: String -> Inbox e -> STM Int -> Signal Int
 counting which inbox = named (maybe "messages" fst (called inbox) ++ " " ++ which) . watching
 
@@ -282,7 +281,7 @@ deliver inbox e = readTVar (isOpen inbox) >>= \open -> when open $ do
   modifyTVar' (queue inbox) (|> Message number e)
   dropOldest inbox
 
--- | Puts a message back that was taken: behind those that are older.
+-- | Puts back a message that was taken: behind those that are older.
 putBack :: Inbox e -> Message e -> STM ()
 putBack inbox message@(Message number _) = do
   modifyTVar' (queue inbox) $ \messages ->
@@ -298,7 +297,7 @@ dropOldest inbox = do
     modifyTVar' (queue inbox) (Seq.drop 1)
     modifyTVar' (droppedCount inbox) (+ 1)
 
--- | Takes the oldest message, if there is one, to have it handled.
+-- | Takes the oldest message, if there is one, in order to handle it.
 tryTake :: Inbox e -> STM (Maybe (Message e))
 tryTake inbox = takeOldest inbox >>= traverse (\message -> message <$ for_ (handling inbox) (`modifyTVar'` (+ 1)))
 

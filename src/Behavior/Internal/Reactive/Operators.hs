@@ -67,15 +67,15 @@ rSelect condition left right = reactToCondition "rSelect" condition $ \case
   False -> Run "right" right
 
 -- | One-sided interruption: runs @task@; whenever the condition becomes true, stops
--- it, runs @recovery@ to completion, and begins again.
+-- the task, runs @recovery@ to completion, and begins again.
 --
 -- > monitor (pure False) recovery task  =  task
 --
 -- The condition is read before anything starts. When it is true, that is latched:
 -- the task is stopped, and when it has ended, cleanup included, @recovery@ runs to
 -- completion while the condition is not watched, even if it has become false by
--- then. After that it is read again; the task restarts from its beginning. (To go on where it was, use
--- 'Behavior.resumable' in the task.)
+-- then. After that the condition is read again, and the task restarts from its beginning. (To go on where
+-- it was, use 'Behavior.resumable' in the task.)
 --
 -- [Result] That of the task, also if it completed although its stop was requested; then the
 --   recovery does not run.
@@ -104,7 +104,7 @@ monitor condition recovery task = reactToCondition "monitor" condition $ \case
   True -> RunToEnd "recovery" (BeginAgain <$ recovery)
   False -> Run "task" task
 
--- | Runs @act@; when the condition becomes true, stops it, and runs @emergency@ in its place: once,
+-- | Runs @act@; when the condition becomes true, stops @act@, and runs @emergency@ in its place: once,
 -- to completion, and with no way back.
 --
 -- > insteadWhen (pure False) emergency act  =  act
@@ -140,8 +140,8 @@ insteadWhen condition emergency act = reactToCondition "insteadWhen" condition $
 -- | 'rSelect' with a branch for each value of any type.
 --
 -- Everything that is documented for 'rSelect' holds here too. When the value changes and changes
--- back, the branch restarts: where a flicker must not restart it, use 'Behavior.Signal.debounce'; to
--- give up for good, 'insteadWhen' or 'whileHolding'.
+-- back, the branch restarts. If a flicker must not restart it, use 'Behavior.Signal.debounce'; if it
+-- must not restart at all, 'insteadWhen' or 'whileHolding'.
 --
 -- >>> Signal.switch (pure "dock") (\mode -> putStrLn ("in mode " ++ mode))
 -- in mode dock
@@ -157,9 +157,9 @@ switch signal behavior = react "switch" [] signal (Run "branch" . behavior)
 -- running behaviour is stopped, the conditions are read again, and the first one that
 -- then holds decides. Everything that is documented for 'rSelect' holds here too.
 --
--- A rule that returns ends 'teleoReactive', with its result. A rule that has done its work when its condition
--- no longer holds is therefore a loop, or waits at its end: if its last step makes the condition false, it may
--- either return or be stopped first. Messages of a driver as one of the rules: 'Behavior.Message.messageRule'.
+-- A rule that returns ends 'teleoReactive', with its result. So a rule whose work is done when its condition
+-- no longer holds must be a loop, or wait at its end: if its last step makes the condition false, it could
+-- return before it is stopped. A rule that handles a driver's messages is 'Behavior.Message.messageRule'.
 --
 -- >>> Signal.teleoReactive [(pure False, pure "flee"), (pure True, pure "graze")]
 -- "graze"
@@ -205,7 +205,7 @@ waitUntil condition = reactToCondition "waitUntil" condition $ \case
   True -> Conclude Nothing (pure ())
   False -> Idle
 
--- | Waits until there is a value, and returns it: the first one. Otherwise it is as 'waitUntil'.
+-- | Waits until there is a value, and returns that first value. In everything else it is like 'waitUntil'.
 --
 -- > waitUntil c  =  waitUntilJust ((\holds -> if holds then Just () else Nothing) \<$> c)
 --
@@ -220,7 +220,7 @@ awaiting :: String -> Signal (Maybe a) -> Behavior a
 awaiting name signal = react name [] (Awaited <$> signal) $ \(Awaited value) ->
   maybe Idle (Conclude Nothing . pure) value
 
--- | A value that is waited for: the first one ends the wait, so no two are compared.
+-- | A value that is waited for. The first one ends the wait, so two values are never compared.
 newtype Awaited a = Awaited (Maybe a)
 
 instance Eq (Awaited a) where

@@ -37,23 +37,23 @@ import Behavior.Internal.Signal.Source
 -- >   -- if c is false at first, act has no result, pause stops when it should, and nothing throws
 --
 -- The condition is read before anything starts, and while it holds, @act@ does not begin. Later, whenever
--- it becomes true, @pause@ runs beside @act@; and when it has become false again, @resume@. What
--- cannot be paused, is stopped and begins again: 'stoppedWhile'.
+-- it becomes true, @pause@ runs beside @act@; and when it has become false again, @resume@. For a
+-- behaviour that cannot be paused, there is 'stoppedWhile': it stops the behaviour, and begins it again.
 --
--- That @resume@ runs is certain once @pause@ has begun, whatever happens: if @act@ ends meanwhile, if
--- the caller is cancelled, if @pause@ itself fails or completes late, or is no longer needed before it has
--- ended (it is then stopped, perhaps before it had an effect: to resume what is not paused must do no
--- harm). Nothing interrupts @resume@, and everything waits for it: if it takes time, limit it
--- (@'Behavior.Time.timeout' 1 resume@). Of @pause@ and @resume@ never two run at once.
+-- Once @pause@ has begun, @resume@ is certain to run, whatever happens: if @act@ ends meanwhile, if
+-- the caller is cancelled, or if @pause@ itself fails or completes late. If the condition is false again
+-- before @pause@ has ended, @pause@ is stopped, perhaps before it had an effect: so @resume@ must do no
+-- harm when nothing is paused. Nothing interrupts @resume@, and everything waits for it: if it takes time,
+-- limit it (@'Behavior.Time.timeout' 1 resume@). @pause@ and @resume@ never run at the same time.
 --
 -- [Result] That of @act@, also if it completed although its stop was requested.
--- [Failure] Of @act@, also while it is being stopped. Of @pause@ (also while it is being stopped), or else
---   of @resume@, or of the condition: @act@ is stopped, and it is thrown. After the end of @act@ they are
---   ignored.
+-- [Failure] Of @act@, also while it is being stopped: thrown. Of @pause@ (also while it is being stopped), or
+--   else of @resume@, or of the condition: @act@ is stopped, and the failure is thrown; after the end of @act@
+--   it is ignored.
 -- [Fault] Of any of them, also while stopping: thrown, whatever else has failed.
 -- [Cancellation] Requests the stop of everything together. So @resume@ runs beside the cleanup of
---   @act@, which therefore need not wait for it; a driver must not begin to move because it is resumed
---   while its goal is being cancelled.
+--   @act@, and neither waits for the other. (A driver that is resumed while its goal is being cancelled must
+--   not begin to move.)
 --
 -- >>> near <- newTVarIO False
 -- >>> paused <- newTVarIO False
@@ -73,8 +73,8 @@ import Behavior.Internal.Signal.Source
 pausedWhile :: Signal Bool -> Behavior () -> Behavior () -> Behavior a -> Behavior a
 pausedWhile condition pause resume act = react "pausedWhile" [()] beginning $ \() -> Run "branch" act
  where
-  -- It has its value when the condition was false for the first time; meanwhile, and from then on, the
-  -- pauses are its sensor.
+  -- This signal has a value from the moment when the condition is false for the first time. Its worker, before
+  -- that moment and after it, is the operator that runs the pauses.
   beginning = Signal $ \_ -> do
     begun <- newTVarIO False
     pure
@@ -93,8 +93,8 @@ pausedWhile condition pause resume act = react "pausedWhile" [()] beginning $ \(
     unless (is || holds) (writeTVar begun True)
     pure (if is || not holds then Just holds else Nothing)
 
--- | Pauses, and when it is stopped, or pausing has failed, resumes. Its own stop is received only before
--- that, and cannot replace what either of them throws.
+-- | Pauses; when its own stop is requested, or pausing has failed, resumes. It receives a stop request only
+-- before it resumes, and the request does not replace what pausing or resuming throws.
 pauseThenResume :: Behavior () -> Behavior () -> Behavior ()
 pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
   pausing <- branch scope "pause" pause
@@ -119,13 +119,13 @@ pauseThenResume pause resume = mask_ . structured "pausedWhile" $ \scope -> do
 --
 -- > stoppedWhile c act  =  teleoReactive [(not \<$> c, act)]
 --
--- For what its driver can pause, there is 'pausedWhile'. To go on where it was, the behaviour keeps its
--- progress: 'Behavior.resumable'.
+-- If the driver can pause, use 'pausedWhile' instead. For a behaviour that keeps its progress, and so goes on
+-- where it was, there is 'Behavior.resumable'.
 --
 -- > Signal.stoppedWhile personNear (resumable waypoints driveTo)
 --
 -- Everything that is documented for 'Behavior.Signal.rSelect' holds here too. While the condition
--- holds, it waits. To give up then, use 'Behavior.Signal.whileHolding'.
+-- holds, this operator waits. To fail instead, use 'Behavior.Signal.whileHolding'.
 --
 -- >>> near <- newTVarIO False
 -- >>> left <- newTVarIO ["gate", "pond", "shed"]

@@ -64,15 +64,15 @@ timeout seconds behavior = do
 --
 -- > timeoutAt end act  =  now >>= \t -> timeout (max 0 (end - t)) act
 --
--- The deadline is the same however often the behaviour begins again: so a mission has its limit in
--- total, its recoveries included, and within that each try has one of its own, with growing pauses in
--- between:
+-- The deadline stays the same, however often the behaviour begins again. So a mission can have a limit in
+-- total, its recoveries included; and within it each try has a limit of its own, with growing pauses between
+-- the tries:
 --
 -- > do end <- (+ 60) <$> now
 -- >    monitor low charge (timeoutAt end (retrying (iterate (* 2) 1) (timeout 5 deliver)))
 --
--- (The monitor interrupts what has the limit, and so a recovery is not cut short. A @timeout 60@ in its
--- place would begin again with the task.)
+-- (The limit is inside the monitor, so it cuts no recovery short. A @timeout 60@ in its place would begin again
+-- with the task.)
 --
 -- [Result, failure, fault, cancellation] As in 'timeout'. 'TimedOut' has the number of seconds from its
 --   start to the deadline.
@@ -117,8 +117,8 @@ instance Exception TimedOut where
 -- 'uninterruptibleMask_' nothing could stop it. Here it runs in a branch, unmasked, whatever the
 -- caller's masking state. When the time is up its stop is requested; then it is still awaited.
 --
--- [Result] The behaviour's; 'Nothing' when its time was up and it has stopped. So the exception that
---   it is a cleanup for goes on.
+-- [Result] The behaviour's; 'Nothing' when its time was up and it has stopped. So the exception that made the
+--   cleanup necessary goes on.
 -- [Failure, fault] Of the behaviour: thrown.
 -- [Cancellation] Stays pending until it has ended.
 --

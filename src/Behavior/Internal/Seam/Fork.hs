@@ -4,7 +4,8 @@
 {-# LANGUAGE UnboxedTuples #-}
 
 -- |
--- Forking a thread without the exception handler that 'Control.Concurrent.forkIO' installs: the thread has its own.
+-- Forking a thread without the exception handler that 'Control.Concurrent.forkIO' installs: the library's threads
+-- catch everything themselves.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Seam.Fork
@@ -23,7 +24,7 @@ data Placement
   = -- | Like the thread that starts it: if that is pinned, on the same capability; otherwise
     -- wherever GHC moves it.
     Inherited
-  | -- | Always on the capability on which the thread runs that starts it.
+  | -- | Always on the capability of the thread that starts it.
     Pinned
   | -- | Wherever GHC moves it.
     Unpinned

@@ -1,11 +1,11 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The seam: everything that an operator does with threads, time and blocking goes through this module. No module
--- but those below it and the simulator forks, delays, throws to a thread or blocks in a transaction. So a simulation
--- that replaces the operations of this module replaces all of them. (Two have threads that are part of no simulation:
--- "Behavior.Internal.Tracing.Sink", and "Behavior.Internal.Program.ProcessSignals" for the handlers of the process.
--- @.ci\/lint@ checks that there is no other.)
+-- The seam: everything that an operator does with threads, time and blocking goes through this module. Except for
+-- the modules below it and the simulator, no module forks, delays, throws to a thread or blocks in a transaction. So
+-- a simulation that replaces the operations of this module replaces all of them. (Two modules start threads that are
+-- part of no simulation: "Behavior.Internal.Tracing.Sink", and "Behavior.Internal.Program.ProcessSignals" for the
+-- handlers of the process. @.ci\/lint@ checks that there is no other.)
 --
 -- Each operation is dispatched to one of two backends: the real one, or the simulation that
 -- the calling thread is part of ("Behavior.Internal.Core.Dispatch").
@@ -65,7 +65,7 @@ import qualified Behavior.Internal.Seam.TimerWheel as Timer
 -- | Runs a transaction; while it retries, blocks without using the processor.
 --
 -- Like stm's 'Control.Concurrent.STM.atomically', but visible to the simulator
--- ("Behavior.Sim"); use it instead. Like every operation that blocks it can be cancelled, also
+-- ("Behavior.Sim"); use it instead. Like every operation that blocks, it can be cancelled even
 -- where exceptions are masked.
 --
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar)
@@ -113,8 +113,8 @@ awaitUninterruptibly block = uninterruptibleMask_ again
 checkpoint :: IO ()
 checkpoint = inSimulation (pure ()) pause
 
--- | Yields to threads that were just started or interrupted, so that what they do at once need
--- not be waited for. (In a simulation it does nothing: the schedule decides which thread runs.)
+-- | Yields to threads that were just started or interrupted: so the caller need not block for what
+-- they do at once. (In a simulation it does nothing: the schedule decides which thread runs.)
 yieldReal :: IO ()
 yieldReal = inSimulation yield (const (pure ()))
 
@@ -151,7 +151,7 @@ sleep seconds = do
 -- > sleep s  =  now >>= \t -> sleepUntil (t + s)
 --
 -- With an infinite number it sleeps until it is cancelled. NaN is refused with an 'ErrorCall' (a
--- fault). A deadline for a behaviour is 'Behavior.Time.timeoutAt'.
+-- fault). For a behaviour with a deadline there is 'Behavior.Time.timeoutAt'.
 --
 -- >>> started <- now
 -- >>> sleepUntil (started + 0.001)

@@ -56,8 +56,8 @@ import Behavior.Internal.Spans.Span (branchSpan)
 
 -- | A thread that the library has started, and what it publishes as it ends.
 --
--- (Not an @Async r@: to read the result of that without blocking takes a transaction, the transaction that
--- publishes it writes nothing else, and a branch would take more bytes.)
+-- (It is not an @Async r@: reading the result of one without blocking takes a transaction, the transaction that
+-- publishes its result can write nothing else, and a branch would take more bytes.)
 data Thread r = Thread
   { threadId :: !ThreadId
   -- ^ The thread itself.
@@ -130,8 +130,8 @@ runThread here label act = do
   pure end
 {-# INLINE runThread #-}
 
--- | Labels the calling thread. (What the text of a name throws, of whatever type, must not end it; and
--- a stop request must not be taken for that.)
+-- | Labels the calling thread. (If the text of a name throws, of whatever type, that must not end the thread; and
+-- a stop request must not be taken for it.)
 labelSelf :: Maybe Place -> Label -> IO ()
 labelSelf here label =
   uninterruptibleMask_ $

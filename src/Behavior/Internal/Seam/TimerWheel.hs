@@ -8,9 +8,9 @@
 -- costs nothing, because it unregisters nothing.
 --
 -- A cancelled sleeper leaves an entry in the bucket's queue until the bucket is filled.
--- Therefore no thread waits at a bucket that is farther away than one second, or than it has
--- slept so far if that is longer: the entry of a cancelled short sleep is gone within a
--- second, and that of a long one within the time that it had slept.
+-- Therefore a thread waits only at a bucket that is at most one second away, or at most as far
+-- as it has slept so far, if that is longer. So the entry of a cancelled short sleep is gone within
+-- a second, and that of a long one within the time that it had slept.
 --
 -- (A process made by @forkProcess@ while another thread slept has a copy of the armed timers,
 -- but not the threads that run them: nothing wakes there.)
@@ -82,8 +82,8 @@ sleepTicks from end = go from
     bucketAt next >>= readMVar
     when (next < end) $ go next
 
--- | The tick of the bucket to wait at next, in a sleep from the first tick until the second that
--- has lasted until the third.
+-- | The tick of the bucket to wait at next. The arguments are the ticks at which the sleep began, at which it is
+-- to end, and until which it has lasted.
 nextBucket :: Tick -> Tick -> Tick -> Tick
 nextBucket from end t = t + min (end - t) (max ticksPerSecond (t - from))
 

@@ -3,7 +3,8 @@
 {-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
--- Signals that ignore changes which are brief, small or too frequent, count them, or judge their age.
+-- Signals that ignore changes which are brief, small or too frequent; that count changes; or that judge the age of
+-- a value.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Signal.Filter
@@ -75,8 +76,8 @@ debounce seconds signal = Signal $ \demand -> do
 -- last one that counted was less than the given number of seconds ago (zero or more). Then the signal keeps
 -- its value until that time has passed, and takes the one that is then the latest.
 --
--- So two changes of the signal are at least that far apart, and the last one always comes. Like that of
--- 'debounce', its memory begins afresh after a time when it was not watched. It bounds how often an
+-- So two changes of the signal are at least that far apart, and the last one always comes. After a time when
+-- it was not watched (as during a recovery), it begins afresh, as 'debounce' does. It bounds how often an
 -- operator restarts its branch:
 --
 -- > planner ||| Signal.switch (Signal.throttle 5 path) fly
@@ -109,10 +110,10 @@ throttle seconds signal = Signal $ \demand -> do
 --
 -- > Signal.whileHolding (not \<$\> Signal.olderThan 0.5 (stamp \<$\> scan)) drive
 --
--- The driver stores a reading together with its time; a polled sensor does with
--- @polling 0.1 ((,) \<$\> now \<*\> readScan)@. After a time that is earlier than the one before, it can be
--- late to become true, by up to their difference. A time that is NaN is a fault. Unlike 'staleAfter' this
--- gives a condition, works with every signal, and goes by the time of the last reading that there is.
+-- The driver must store each reading together with its time; for a polled sensor write
+-- @polling 0.1 ((,) \<$\> now \<*\> readScan)@. If a time is earlier than the one before it, the condition can
+-- become true late, by up to the difference. A time that is NaN is a fault. Unlike 'staleAfter' this
+-- gives a condition, works with every signal, and judges the last reading, not one that is in flight.
 --
 -- >>> stamp <- now
 -- >>> Signal.waitUntil (Signal.olderThan 0.01 (pure stamp))
@@ -164,8 +165,8 @@ olderThan seconds signal = Signal $ \demand -> do
 --
 -- @low@ must not be above @high@, and neither may be NaN (otherwise an 'ErrorCall' is thrown).
 --
--- True is the side of the /high/ values. A battery that is low from 20 % down, and until it has 80 %,
--- is therefore the negation, @initial@ included:
+-- True means that the value is /high/. That a battery is low (from 20 % down, and then until it has 80 %)
+-- is therefore the negation, and @initial@ is negated, too:
 --
 -- > low = not \<$> Signal.hysteresis True 20 80 level     -- not: Signal.hysteresis False 20 80 level
 --
@@ -186,12 +187,12 @@ hysteresis initial low high signal = Signal $ \demand -> do
   open (accumulate "hysteresis" initial (\before v -> v >= high || (before && v > low)) signal) demand
 
 -- | How often the signal has changed since the operator began: 0 at first. A signal that is true for
--- an instant is easily missed; this one stays changed.
+-- an instant is easily missed; that it has changed stays visible here.
 --
 -- > waitUntil ((> 0) \<$\> changes s)     -- waits for a change from now on
 --
--- A change that is undone before it is seen is not counted, and what changes while it is not watched
--- (as during a recovery) is one change, or none. Like the memory of 'hysteresis', the count lasts for
+-- A change that is undone before it is seen is not counted; all changes while the signal is not watched
+-- (as during a recovery) count as one, or none. Like the memory of 'hysteresis', the count lasts for
 -- the operator's whole run.
 --
 -- >>> goal <- newTVarIO "kitchen"
@@ -232,8 +233,8 @@ accumulate name initial next signal = Signal $ \demand -> do
       , view = mapView state <$> view source
       }
 
--- | A value that a filter keeps, and its readings, from the same transaction. They do not count when it
--- is compared.
+-- | A value that a filter keeps, and its readings, from the same transaction. The readings do not count when
+-- two kept values are compared.
 data Kept a = Kept {kept :: a, keptReadings :: [Reading]}
 
 instance Eq a => Eq (Kept a) where
@@ -245,14 +246,14 @@ keeping seen = ignoreErrors seen >>= \a -> Kept a <$> readings seen
 
 -- | The view that shows what a filter keeps. The source is read too, so that what it throws is thrown.
 --
--- (With filters in each other, all below are read, and a change of one wakes the threads of all above: at
--- depth n, n changes wake up to n threads, which read up to n variables.)
+-- (In nested filters, each reads all those inside it, and a change of one wakes the threads of all those around
+-- it: at depth n, n changes wake up to n threads, which read up to n variables.)
 showingKept :: TVar (Maybe (Kept a)) -> View a -> View a
 showingKept variable seen = (mapView (*> (kept <$> value)) seen) {readings = keptReadings <$> value}
  where
   value = readTVar variable >>= maybe retry pure
 
--- | The first read, for workers, which only wait for values. What it throws is left to the
--- operator, which reads the value itself.
+-- | The first read, for workers, which only wait for values. They ignore what it throws: the operator
+-- reads the value itself, and throws it.
 ignoreErrors :: View a -> STM a
 ignoreErrors v = firstRead v `catchSTM` \(_ :: SomeException) -> retry

@@ -29,8 +29,9 @@ import Behavior.Internal.Signal.Source
 --
 -- Readings start in slots that are a period apart, counted from start to start; each slot
 -- has at most one. A reading that overruns its slot skips the slots that it missed.
--- An operator always decides on a reading that began after the operator did; after it has
--- stopped a branch, on one that began after that, so it waits for the next slot.
+-- An operator always decides on a reading that began after the operator did. After it has
+-- stopped a branch, it decides on a reading that began after the branch had ended: so it waits for the
+-- next slot.
 --
 -- The first reading is made at once. From then on, sensors of the same period are read
 -- together: the second reading may come up to a tenth of a period late, and those after it
@@ -69,8 +70,8 @@ polling every act = Signal $ \demand -> do
           generation <- readTVarIO views
           (reading, stopWanted) <- mask $ \restore -> do
             reading <- trySynchronous (restore act)
-            -- The stop request, if there is one, stays pending until what went wrong has
-            -- been thrown.
+            -- A stop request stays pending here, until the fault of the reading, if there is
+            -- one, has been thrown.
             stopWanted <- stopRequested
             -- The reading is no longer needed, and may have swallowed the stop request.
             -- A fault of its cleanup is not lost.

@@ -140,7 +140,7 @@ data View a = View
   , reread :: !(STM a)
   -- ^ A later read: a value that is missing has been lost.
   , readings :: STM [Reading]
-  -- ^ The named values that the value is made of. For traces; to be read in a transaction that has
+  -- ^ The named values that the value is made of, for traces. Read them in a transaction that has
   -- read the value.
   }
 
@@ -169,7 +169,7 @@ mapView f seen = seen {firstRead = f (firstRead seen), reread = f (reread seen)}
 {-# INLINE mapView #-}
 
 -- | A thread that a source needs while it is read. It runs until its stop is requested, and can
--- read whether it was. It may be started again after a pause.
+-- read whether that has happened. It may be started again after a pause.
 data Worker = Worker
   { workerName :: String
   , prepare :: STM (IO Bool -> IO ())
@@ -183,8 +183,8 @@ data Worker = Worker
 -- be one, limit that by 'Behavior.Time.timeout'). If it retries later, the signal no longer has
 -- a value, and the operator fails. What the transaction throws, the operator throws.
 --
--- The transaction should only read: it is run whenever a variable that it has read changes, and in a
--- trace more often than without one. (What is taken from a queue is a message: "Behavior.Message".)
+-- The transaction should only read: it is run whenever a variable that it has read changes, and more often
+-- in a trace. (To take something from a queue, use "Behavior.Message".)
 --
 -- >>> import Control.Concurrent.STM (newTVarIO, readTVar)
 -- >>> battery <- newTVarIO (5 :: Int)
@@ -230,15 +230,15 @@ namedWith name render signal = Signal $ \demand -> do
   -- (Also without a trace: it may begin while the source is open, in 'Behavior.Signal.withShared'.)
   pure source {view = showing name render <$> view source, names = [name]}
 
--- | The condition, whose readings include its value under this name, if there is no other name.
+-- | The condition. If nothing in it has a name, its readings include its value under this name.
 unlessNamed :: String -> Signal Bool -> Signal Bool
 unlessNamed name = Signal . openInTrace (orNamed name)
 
--- | The same of a source.
+-- | The same for a source.
 orNamed :: String -> Source Bool -> Source Bool
 orNamed name source = if null (names source) then source {view = showing name show <$> view source} else source
 
--- | The condition of the rule with this number, whose readings say so.
+-- | The condition of the rule with this number. Its readings contain that number, and whether it holds.
 conditionOfRule :: Int -> Signal Bool -> Signal Bool
 conditionOfRule n = Signal . openInTrace marked . unlessNamed ("condition " ++ show n)
  where
@@ -246,8 +246,8 @@ conditionOfRule n = Signal . openInTrace marked . unlessNamed ("condition " ++ s
   ofRule seen = seen {readings = says <$> reread seen <*> readings seen}
   says holds = map (\r -> r {readingRule = Just (n, holds)})
 
--- | Opens the signal; if there is a trace, changes the source. (An operator opens it, which is in a trace from its
--- beginning or not at all.)
+-- | Opens the signal; if there is a trace, changes the source. (The operator that opens it is in a trace from its
+-- beginning, or not at all.)
 openInTrace :: (Source a -> Source a) -> Signal a -> Demand a -> IO (Source a)
 openInTrace change signal demand = do
   source <- open signal demand

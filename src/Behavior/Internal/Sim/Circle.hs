@@ -18,9 +18,9 @@ import Behavior.Internal.Core.SafeText
 import Behavior.Internal.Core.Seconds (Seconds)
 import Behavior.Internal.Spans.Event
 
--- | For each operator that has reacted again and again at this time, and goes on: how often, the values to which it
--- reacted, and what it started. The events are given latest first. (One that reacts less than once in a thousand of
--- the scheduling points that the limit allows is not what uses them up.)
+-- | For each operator that has reacted again and again at this time, and has not ended: how often, the values to
+-- which it reacted, and what it started. The events are given latest first. (An operator that has reacted less than
+-- once in a thousand of the scheduling points that the limit allows is not what uses them up.)
 circles :: Int -> Seconds -> [Event] -> [String]
 circles limit moment latestFirst =
   [ described rs
@@ -48,7 +48,7 @@ described rs =
   values = [safeShow (changeSignal c) ++ " " ++ safeShow (changeAfter c) | r <- rs, c <- reactionChanges r]
   starts = map safeShow (mapMaybe reactionStarts rs)
 
--- | The first of them, each once.
+-- | The first few of the texts, each once.
 some :: [String] -> String
 some texts = case splitAt 4 (nub (take 100 texts)) of
   (these, []) -> intercalate ", " these

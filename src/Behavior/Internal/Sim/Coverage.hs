@@ -1,8 +1,8 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What the runs of an exploration have started, and what they have not; and what never came, of that which claims
--- about them presuppose.
+-- What the runs of an exploration have started, and what they have not; and which premises of claims about them never
+-- came.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Coverage
@@ -34,11 +34,12 @@ import Behavior.Internal.Core.SafeText (settledText)
 import Behavior.Internal.Spans.Event
 import Behavior.Internal.Spans.Place (Around (..), Place (..), inPath)
 
--- | What a run can start, in each span with a name, by the span's number (0: in none).
+-- | What a run can start, for each span with a name, by the span's number (0: outside of all these).
 type Reached = IntMap Inner
 
--- | The names around it, the innermost first; and of each operator, which branches it can start, and whether it
--- has. (Scripted actions are those of no operator, and in no span: such an action is the same one wherever it runs.)
+-- | The names around it, the innermost first; and for each operator, which branches it can start, and whether it
+-- has. (Scripted actions count as branches of an operator without a name, outside of all spans: such an action is the
+-- same one wherever it runs.)
 data Inner = Inner [String] !Operators
 
 type Operators = Map String (Map String Bool)
@@ -47,7 +48,7 @@ type Operators = Map String (Map String Bool)
 nothingYet :: Reached
 nothingYet = IntMap.empty
 
--- | With what this operator can start here.
+-- | Adds what this operator can start here.
 canStart :: String -> [String] -> Maybe Place -> Reached -> Reached
 canStart operator branches here reached
   | all (`Map.member` before) branches = reached
@@ -58,7 +59,7 @@ canStart operator branches here reached
   before = Map.findWithDefault Map.empty operator inside
   new = Map.fromList (map (\branch -> (branch, False)) branches)
 
--- | With this branch, which is started here.
+-- | Marks this branch, which starts here, as started.
 starts :: Label -> Maybe Place -> Reached -> Reached
 starts (Label operator branch) here reached = case Map.lookup operator inside of
   Just branches
@@ -87,16 +88,16 @@ data Coverage = Coverage
   { known :: !(Set String)
   -- ^ The names of what was started.
   , could :: !(Map [String] Operators)
-  -- ^ Of what could be started, whether it was, by the names around it, the outermost first.
+  -- ^ What could be started, and whether it was, by the names around it, the outermost first.
   , came :: !(Map String Bool)
-  -- ^ Of what claims presuppose, whether it came.
+  -- ^ The premises of claims, and whether each has come.
   }
 
 -- | That of no run.
 noCoverage :: Coverage
 noCoverage = Coverage Set.empty Map.empty Map.empty
 
--- | With that of a further run.
+-- | Adds what a further run has reached.
 withRun :: [Event] -> Reached -> Map String Bool -> Coverage -> Coverage
 withRun happened reached premises before =
   Coverage
@@ -131,6 +132,6 @@ neverStarted covered =
   , (name, False) <- Map.toList branches
   ]
 
--- | What has come in no run, of that which claims presuppose.
+-- | The premises of claims that have come in no run.
 neverCame :: Coverage -> [String]
 neverCame covered = [what | (what, False) <- Map.toList (came covered)]

@@ -51,7 +51,8 @@ file sim task = do
       AlwaysEnabled -> intoReady
  where
   intoReady = modifyIORef' (ready sim) (Map.insert (taskNumber task) task)
-  -- Then the task is enabled in any case: if its operation has to wait, it receives the exception.
+  -- Whether there is an exception for the task that makes it enabled in any case: if its operation has to wait, it
+  -- receives the exception.
   canRaise position = do
     arrived <- isJust <$> readIORef (pendingException task)
     waiting <- not . null <$> readIORef (pending task)

@@ -51,8 +51,8 @@ instance Exception Unrepeatable
 -- [Fault] If a run is not a valid simulation ('BlockedOutside', 'ExternalWakeup', 'TooSlow',
 --   'ScheduleMismatch'), an 'ErrorCall' with the text of 'explain' is thrown to the property; and also if a
 --   mock world was used that belongs to another run. A property that catches it fails all the same.
---   What would test nothing throws an 'ErrorCall' to the caller: a plan without a schedule, and a
---   property that returns without a simulation.
+--   Where nothing would be tested, an 'ErrorCall' is thrown to the caller: by a plan without a schedule, and
+--   by a property that returns without a simulation.
 --
 -- >>> :{
 -- report <- explore (exhaustively 1) $ \simulate -> do

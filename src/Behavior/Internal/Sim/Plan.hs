@@ -91,8 +91,8 @@ replaying :: Schedule -> Plan
 replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 
 -- | The same plan with an end: every run is ended with 'OutOfTime' when the virtual time
--- reaches this ('endAt'). For missions that do not end by themselves. (One that waits for what never
--- comes is a 'Deadlock' all the same; if it is to end so, write @mission ||| sleep 60@.)
+-- reaches this ('endAt'). For missions that do not end by themselves. (A mission in which nothing can run any
+-- more ends with a 'Deadlock' all the same; if it may wait like that, write @mission ||| sleep 60@.)
 --
 -- >>> import Control.Monad (forever)
 -- >>> report <- explore (randomly 100 `endingAt` 60) (\simulate -> () <$ simulate (forever (sleep 1)))
@@ -103,7 +103,7 @@ replaying s = plan (Replay s) defaultSimOptions {detailedSteps = True}
 endingAt :: Plan -> Seconds -> Plan
 endingAt whole end = whole {planOptions = (planOptions whole) {endAt = end}}
 
--- | What was explored. Its text has the numbers, and how runs have ended that did not return, and what
+-- | What was explored. Its text has the numbers; how those runs have ended that did not return; and what
 -- no schedule has started, or has brought about.
 --
 -- @since 0.1.0.0
@@ -129,8 +129,8 @@ data Report = Report
   -- with the same names around them count as one. (The branches of 'Behavior.Signal.switch' are not known
   -- before; an alternative of '?' is no branch: name it, and require it in 'reportStarted'.)
   , reportNeverCame :: [String]
-  -- ^ What came under no schedule, although a claim of 'Behavior.Sim.Mock.shouldRecord' holds whatever happens
-  -- without it: what triggers a 'Behavior.Sim.Mock.whenever', what is second in a
+  -- ^ What came under no schedule, and without which a claim of 'Behavior.Sim.Mock.shouldRecord' holds whatever
+  -- the robot does: the first moment of a 'Behavior.Sim.Mock.whenever', the second of a
   -- 'Behavior.Sim.Mock.comesBefore', and the intervals of a 'Behavior.Sim.Mock.never' with
   -- 'Behavior.Sim.Mock.during' or 'Behavior.Sim.Mock.overlapping'.
   }

@@ -47,8 +47,8 @@ import Behavior.Internal.Spans.Place (Receiver (..), Trace, inPlace, newTrace, p
 --
 -- > simulate  =  simulateWith defaultSimOptions
 --
--- [Result] How the run ended ('Outcome'): also if the behaviour failed or faulted, and also for a
---   deadlock, a livelock, and the mistakes that a simulation finds.
+-- [Result] How the run ended ('Outcome'), even if the behaviour failed or faulted, or there was a
+--   deadlock, a livelock, or a mistake that a simulation finds.
 -- [Fault] A simulation inside a simulation throws an 'ErrorCall'.
 -- [Cancellation] When the caller is cancelled, the run is ended, and then the cancellation is
 --   thrown.
@@ -89,7 +89,7 @@ simulateWith o act = do
   fst <$> simulateBy o Nothing chooser act
 
 -- | 'simulateWith' under the given policy, for the property that runs it. It also gives what the run could start,
--- and has.
+-- and what it has started.
 simulateBy :: SimOptions -> Maybe Property -> Policy -> Behavior a -> IO (Run a, Reached)
 simulateBy o property chooser act = do
   nested <- simulator

@@ -6,8 +6,8 @@
 --
 -- Each simulated thread is a real thread, a 'Task', that runs only while it has the turn, and
 -- otherwise waits at its own gate. Only the task that has the turn reads and writes the state
--- of the simulation, so the state needs no locks. (It is in many cells, and not in one record: of that a change of
--- one field would copy all. And at the end of a run the driver writes some of them while a task still runs.)
+-- of the simulation, so the state needs no locks. (The state is in many cells, and not in one record: a change of one
+-- field would copy the whole record. And at the end of a run the driver writes some cells while a task still runs.)
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.State
@@ -89,7 +89,7 @@ data Sim = Sim
   , emitted :: !(IORef [Event])
   -- ^ The events of its trace, the latest first.
   , reached :: !(IORef Reached)
-  -- ^ What its operators and mock worlds can start, and have.
+  -- ^ What its operators and mock worlds can start, and what of that they have started.
   , runEnd :: !(MVar (Maybe (Outcome Void)))
   -- ^ How the run ended; 'Nothing': as the behaviour did. The task that puts it no longer has
   -- the turn.

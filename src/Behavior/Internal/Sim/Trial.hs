@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- One test of a property, under one schedule; and what is kept of many.
+-- One test of a property, under one schedule; and the sums of many tests.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Sim.Trial
@@ -42,9 +42,9 @@ data Trial = Trial
   , traceOfRun :: [Event]
   , size :: Int
   , reached :: Reached
-  -- ^ What it could start, and has.
+  -- ^ What it could start, and what of that it has started.
   , claimed :: Map String Bool
-  -- ^ What its claims presuppose, and whether it came.
+  -- ^ The premises of its claims, and whether each has come.
   }
 
 -- | A trial that has not run anything.
@@ -110,7 +110,7 @@ data Tally = Tally
   { tried :: !Int
   , points :: !Int
   , otherEnds :: !(Map String Int)
-  -- ^ How they ended that did not return.
+  -- ^ How those trials ended that did not return a result.
   , covered :: !Coverage
   }
 

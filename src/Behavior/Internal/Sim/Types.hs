@@ -33,18 +33,18 @@ data SimOptions = SimOptions
   { scheduled :: Schedule
   -- ^ Which thread runs when several are enabled.
   , endAt :: Seconds
-  -- ^ The virtual time at which the run is ended ('OutOfTime'); infinite by default. If nothing can
-  -- run any more before it, that is a 'Deadlock' all the same, and the virtual time goes on to the
-  -- end: the record of a mock world is complete until then.
+  -- ^ The virtual time at which the run is ended ('OutOfTime'); infinite by default. If before that time
+  -- nothing can run any more, the run ends with a 'Deadlock' all the same; its virtual time still goes on to
+  -- this one, so that the record of a mock world is complete until then.
   , livelockLimit :: Int
   -- ^ After this number of scheduling points during which the virtual time does not advance, the
   -- run is ended ('Livelock'); 100,000 by default.
   , realTimeLimit :: Seconds
   -- ^ After this amount of real time the run is ended ('TooSlow'); 9 s by default.
   , timerSlip :: Seconds
-  -- ^ A sleeper may be late by less than this: whenever the virtual time advances, the schedule
-  -- may let it advance to any moment at which a sleeper is due, less than this after the first
-  -- such moment. By default 0: timers are exact.
+  -- ^ A sleeper may be late by less than this. Whenever the virtual time advances, the schedule chooses among
+  -- the moments at which a sleeper is due: the first one, and those that are less than this after it.
+  -- By default 0: timers are exact.
   , detailedSteps :: Bool
   -- ^ Whether 'steps' contains every operation, and not only the starts and ends of threads,
   -- the exceptions that they receive, and their notes; by default 'False'.

@@ -26,8 +26,8 @@ import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Turn (waitingTasks)
 import Behavior.Internal.Sim.Types
 
--- | The simulations to check. The watchdog keeps them alive. Otherwise GHC would find their
--- threads, which only a waiting thread can wake, deadlocked.
+-- | The simulations to check. (This keeps them alive. Otherwise GHC would find their threads deadlocked,
+-- because only threads that wait themselves can wake them.)
 watchedSims :: IORef (Map Int Sim, Bool)
 watchedSims = unsafePerformIO (newIORef (Map.empty, False))
 {-# NOINLINE watchedSims #-}
@@ -51,13 +51,13 @@ change f = atomicModifyIORef' watchedSims (\old -> case f old of new@((sims, _),
 data Sample = Sample
   { atPoint :: !Int
   , waits :: !Int
-  -- ^ How many times it was at this point, and its thread waited outside of the simulation.
+  -- ^ At how many checks it was at this point, and its thread waited outside of the simulation.
   , since :: !Double
   -- ^ The real time of the first check.
   , reported :: !Bool
   -- ^ Whether the watchdog has ended the run.
   , warned :: !Bool
-  -- ^ Whether the warning was printed that the thread did not stop.
+  -- ^ Whether the warning that the thread cannot be stopped was printed.
   }
 
 -- | Checks every few milliseconds, as long as there are simulations.

@@ -33,8 +33,8 @@ import Behavior.Internal.Core.Seconds (Seconds)
 -- @since 0.1.0.0
 data Event
   = Began !Span
-  | -- | How a span ended, and when. It contains the whole span again: the event that said that the
-    -- span began may have been lost.
+  | -- | How a span ended, and when. It contains the whole span again, because the 'Began' of that
+    -- span may have been lost.
     Ended !Span !Seconds !End
   | Reacted !Reaction
   | -- | This number of events was lost here: the sink did not keep up.
@@ -52,7 +52,7 @@ data Span = Span
   , spanName :: String
   , spanBegan :: !Seconds
   , spanReaction :: !(Maybe Int)
-  -- ^ The number of the reaction that started the innermost branch around it, unless another span is in between.
+  -- ^ For an outermost span in a branch that a reaction started: the number of that reaction.
   }
   deriving (Eq, Ord, Show, Read)
 
@@ -68,7 +68,7 @@ data Parent
     UnknownParent
   deriving (Eq, Ord, Show, Read)
 
--- | What kind of thing ran.
+-- | What ran: a named behaviour, an operator, or a branch.
 --
 -- @since 0.1.0.0
 data SpanKind
@@ -105,8 +105,9 @@ data Reaction = Reaction
   , reactionTime :: !Seconds
   -- ^ When the operator decided.
   , reactionChanges :: [Change]
-  -- ^ The named values of the signal, those it is computed from first. All were read in the
-  -- transaction that decided. (Of ordered rules, only those of the conditions that have changed.)
+  -- ^ The named values of the signal; a value that others are computed from comes before them. All were read in
+  -- the transaction that decided. (Of 'Behavior.Signal.teleoReactive', only the values of conditions that have
+  -- changed.)
   , reactionStopped :: !(Maybe StoppedBranch)
   -- ^ The branch that was stopped; nothing if the operator was waiting, or was cancelled while it stopped the
   -- branch.

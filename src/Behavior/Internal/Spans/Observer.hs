@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What a trace shows of a reactive operator: the engine says what it does, and its observer reports
+-- What a trace shows of a reactive operator. The engine calls its observer at each step; the observer reports
 -- each reaction to a change of the signal: the values, what was stopped, and what starts.
 --
 -- Internal: any of it may change in any release.
@@ -41,13 +41,13 @@ import Behavior.Internal.Spans.Span (endOf, newNumber, parentFor, reportEach)
 data Observer
   = -- | There is no trace: nothing is observed.
     Silent
-  | -- | The place of the operator in the trace, its name, and what was seen of it.
+  | -- | The place of the operator in the trace, its name, and what the observer knows of it.
     Observer !Place String !(IORef Seen)
 
--- | What was seen of an operator.
+-- | What an observer knows of its operator.
 data Seen = Seen
   { lastValues :: !(Maybe Values)
-  -- ^ Those that it read last; nothing before the first reading.
+  -- ^ The values that the operator read last; nothing before the first reading.
   , running :: !(Maybe (String, Seconds))
   -- ^ The branch that began last, and when.
   , reaction :: !(Maybe Reaction)
@@ -64,7 +64,8 @@ observerAt :: String -> Place -> IO Observer
 observerAt operator here = Observer here operator <$> newIORef (Seen Nothing Nothing Nothing True)
 {-# NOINLINE observerAt #-}
 
--- | Runs the operator: when it ends, or is interrupted, a reaction that has started nothing yet is reported.
+-- | Runs the operator. When it ends, or is interrupted, a reaction that was not reported, because it has started
+-- nothing yet, is reported.
 ending :: Observer -> IO a -> IO a
 ending Silent act = act
 ending observer act = act `finally` report observer Nothing
@@ -78,8 +79,8 @@ data Reading = Reading
   { readingName :: String
   , readingText :: String
   , readingRule :: !(Maybe (Int, Bool))
-  -- ^ If it is one of ordered rules whose condition is made of the value: the number of the rule, and whether
-  -- the condition holds.
+  -- ^ If the condition of an ordered rule is made of the value: the number of that rule, and whether its condition
+  -- holds.
   }
 
 -- | The values, which are read only if they are observed.
@@ -88,8 +89,8 @@ observed Silent _ = pure []
 observed Observer {} values = values
 {-# INLINE observed #-}
 
--- | The operator has decided, for these values, which were read in the transaction that decided; and whether that
--- is a reaction even if they are its first. Gives the cause of what it stops now.
+-- | The operator has decided on these values, which were read in the transaction that decided. The Boolean: whether
+-- the decision is a reaction even if these are its first values. Gives the cause for which it stops its branch.
 decides :: Observer -> Bool -> Values -> IO Cause
 decides Silent _ _ = pure (SignalChanged 0 [])
 decides (Observer here operator cell) always after = do
@@ -113,10 +114,10 @@ decides (Observer here operator cell) always after = do
       writeIORef cell seen {lastValues = Just after, reaction = Just reacted, isReported = False}
       pure (SignalChanged n changes)
 
--- | What the values were before, and are now. (Several signals may have the same name: then the first
--- belongs to the first, and so on.) Of ordered rules, those whose conditions have changed, up to the first rule
--- that holds now: the ones after it decide nothing. (The texts are users', and compared here: so they are settled
--- first. A sink's thread does that.)
+-- | What the values were before, and are now. (Several signals may have the same name: then the first of them
+-- before belongs to the first of them now, and so on.) Of ordered rules, only the values of conditions that have
+-- changed, up to the first rule that holds now: later rules decide nothing. (The texts are users', and compared
+-- here: so they are settled first. As the list is lazy, a sink's thread does that.)
 changesBetween :: Values -> Values -> [Change]
 changesBetween before after =
   nub
@@ -174,8 +175,8 @@ startsObserved observer@(Observer here _ cell) name act = do
 waits :: Observer -> IO ()
 waits observer = report observer Nothing
 
--- | Reports the reaction, and which branch starts, unless that was done. (Masked: what interrupts a receiver would
--- leave its sink asleep, and the others without the event.)
+-- | Reports the reaction, and which branch starts, unless that was done. (Masked: a receiver that is interrupted
+-- would leave its sink asleep, and the other receivers without the event.)
 report :: Observer -> Maybe String -> IO ()
 report Silent _ = pure ()
 report (Observer here _ cell) next = mask_ $ do

@@ -4,8 +4,7 @@
 -- Where a thread is in the tree of spans.
 --
 -- Each thread that is in a trace has a cell, which it alone writes, and which is found by the
--- thread's number. A thread that this library starts begins in the place where the thread is that
--- starts it.
+-- thread's number. A thread that this library starts begins in the place of the thread that starts it.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Spans.Place
@@ -52,7 +51,7 @@ import Behavior.Internal.Spans.Event
 data Place = Place
   { trace :: !Trace
   , around :: [Around]
-  -- ^ What it is in, the innermost first.
+  -- ^ The spans and branches around it, the innermost first.
   , path :: [String]
   -- ^ The names of the spans around it, the innermost first.
   , abandonable :: [IORef (Maybe (IntMap Open))]
@@ -60,7 +59,7 @@ data Place = Place
   -- nothing once it has been abandoned.
   }
 
--- | What a place is in. A receiver that needs no operators and branches does not see their spans.
+-- | What is around a place. A receiver that needs no operators and branches does not see their spans.
 data Around
   = -- | In the span with this number.
     InSpan !SpanKind !Int
@@ -78,7 +77,7 @@ data Open = Open
   , openAt :: !Place
   -- ^ Where it began.
   , claimed :: !(IORef Bool)
-  -- ^ Whether its end has been reported. (If it may be abandoned, two threads can do that.)
+  -- ^ Whether its end has been reported. (If the span may be abandoned, two threads can report it.)
   }
 
 -- | A trace while it is made. A trace inside another one uses the numbers of the outer one,
@@ -98,7 +97,7 @@ data Trace = Trace
 -- | What receives the events of a trace. It must neither block nor throw.
 data Receiver = Receiver
   { firstNumber :: !Int
-  -- ^ What has a smaller number is outside of its trace.
+  -- ^ Spans and reactions with a smaller number are outside of its trace.
   , needsDetail :: !Bool
   , receiveEvent :: Event -> IO ()
   }
@@ -174,7 +173,7 @@ shards = unsafePerformIO (listArray (0, shardCount - 1) <$> mapM (const (newIORe
 shardCount :: Int
 shardCount = 64
 
--- | The traces that are being made, the newest last. (Those of simulations do not belong to them.)
+-- | The traces that are being made, the newest last. (Those of simulations are not among them.)
 liveTraces :: IORef (Map Unique Trace)
 liveTraces = unsafePerformIO (newIORef Map.empty)
 {-# NOINLINE liveTraces #-}

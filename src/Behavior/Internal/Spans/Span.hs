@@ -56,8 +56,8 @@ import Behavior.Internal.Spans.Place
 -- in the caller's thread and masking state. In a simulation there is a scheduling point before
 -- and one after it, as for a scripted action.
 --
--- Without a trace it costs less than two nanoseconds, and a loop that goes on in the last step of the
--- behaviour runs in constant space. In a trace such a loop nests: name what is in the loop.
+-- Without a trace it costs less than two nanoseconds, and a loop whose next round is the last step of the
+-- behaviour runs in constant space. In a trace the rounds of such a loop nest: name a part of the round instead.
 --
 -- > patrol = named "leg" drive >> patrol     -- not: patrol = named "leg" (drive >> patrol)
 --
@@ -83,7 +83,7 @@ namedInTrace name act = do
 actionSpan :: String -> Behavior a -> Behavior a
 actionSpan name act = isTraced >>= \traced -> if traced then spanned (\_ -> pure ()) (const id) name act else act
 
--- | Runs the behaviour in a span with this name. The first function is given what happens to it, for the steps
+-- | Runs the behaviour in a span with this name. The first function notes its beginning and its end in the steps
 -- of a simulated run; the second changes what it throws.
 spanned :: (String -> IO ()) -> (Place -> SomeException -> SomeException) -> String -> Behavior a -> Behavior a
 spanned noting change name act =
@@ -153,8 +153,8 @@ endOf = either (\e -> try (evaluate (kind e)) >>= either undefinedException pure
     | otherwise = FaultedWith (displayed e)
   undefinedException e = pure (FaultedWith (displayed e))
 
--- | Registers an open span in the branches around it that may be abandoned. If one has been
--- abandoned, the span's parent has ended: so its parent is unknown.
+-- | Registers an open span in the branches around it that may be abandoned. If one of these has been
+-- abandoned, the span around the new one has ended: then the new span's parent is unknown.
 register :: Open -> IO Open
 register open = do
   inAll <- for (abandonable place) $ \spans ->
@@ -163,8 +163,8 @@ register open = do
  where
   place = openAt open
 
--- | Runs an action that starts a branch which may be abandoned, and gives what reports the end of the
--- spans that are open in that branch, when it is abandoned. Call it masked.
+-- | Runs an action that starts a branch which may be abandoned. It also gives an action for the moment when
+-- the branch is abandoned, which reports the end of the spans that are open in it. Call it masked.
 abandonableIn :: IO a -> IO (a, IO ())
 abandonableIn act =
   myPlace >>= \case
@@ -175,8 +175,8 @@ abandonableIn act =
       let ends known = traverse_ (endSpan (StoppedBy WasAbandoned)) (reverse (IntMap.elems known))
       pure (a, oneAtATime (trace place) (atomicModifyIORef' spans ((,) Nothing) >>= traverse_ ends))
 
--- | What is reported of a branch while it is abandoned would otherwise come in the wrong order: its end
--- before its beginning, or after its parent's end.
+-- | Runs such reports one at a time. Otherwise the reports of a branch that is being abandoned could come in the
+-- wrong order: a span's end before its beginning, or after its parent's end.
 oneAtATime :: Trace -> IO a -> IO a
 oneAtATime t report = uninterruptibleMask_ (withMVar (abandonLock t) (const report))
 
@@ -218,13 +218,14 @@ parentFor receiver place = case [s | s <- around place, isSeenBy receiver s] of
   InBranchOf _ : outer -> parentFor receiver place {around = outer}
   _ -> Top
 
--- | The reaction that started the branch which a place is in, unless it is in a span there, for a receiver.
+-- | The reaction that started the innermost branch around a place, unless there is a span in between, for a
+-- receiver.
 reactionFor :: Receiver -> Place -> Maybe Int
 reactionFor receiver place = case filter (isSeenBy receiver) (around place) of
   InBranchOf n : _ | n >= firstNumber receiver -> Just n
   _ -> Nothing
 
--- | Whether a receiver sees it: not if it is the span of an operator or branch, and the receiver needs none.
+-- | Whether a receiver sees it. A receiver that needs no detail does not see the spans of operators and branches.
 isSeenBy :: Receiver -> Around -> Bool
 isSeenBy receiver = \case
   InSpan kind _ -> kind == Named || needsDetail receiver

@@ -6,8 +6,8 @@
 -- |
 -- Sinks: what receives the events of a trace.
 --
--- Each sink has a thread of its own, and a queue that never blocks those who emit events: when it is
--- full, the newest event is dropped, and counted. These threads do not go through the seam: they are
+-- Each sink has a thread of its own, and a queue that never blocks the threads that emit events: when it is
+-- full, the newest event is dropped, and counted. The sinks' threads do not go through the seam: they are
 -- outside of every simulation, and never change a schedule.
 --
 -- Internal: any of it may change in any release.
@@ -74,10 +74,10 @@ data Queue = Queue
   , size :: !Int
   , newestFirst :: [Event]
   , dropped :: !Int
-  -- ^ How many came after those, and found the queue full.
+  -- ^ How many events came after those, and found the queue full.
   , taken :: !Int
-  -- ^ How many the sink's thread has taken, dropped ones included, until it has written that to
-  -- 'inFlight'.
+  -- ^ How many events (dropped ones included) the sink's thread has taken and not yet written to 'inFlight';
+  -- then zero.
   }
 
 -- | How many events the queue accounts for.
@@ -91,7 +91,7 @@ data Phase
   | Busy
   | -- | No event is accepted any more.
     Closed
-  | -- | Nor is any passed to the sink.
+  | -- | The same; and no event is passed to the sink any more.
     LeftBehind
   deriving (Eq, Ord)
 
@@ -112,7 +112,8 @@ start n destination = do
   work running unmask = do
     self <- myThreadId
     labelThread self ("withTrace: sink " ++ show n)
-    -- What the sink itself does is in a trace without sinks: its events would never end.
+    -- What the sink itself does is in another trace, without sinks. (In its own trace each event would make
+    -- others, without end.)
     nowhere <- newTrace (Seconds <$> getMonotonicTime)
     try (inPlace (Just (placeIn [] nowhere)) (unmask (drain running destination))) >>= \case
       Left e -> close running >> notify (SinkThrew e)
@@ -149,7 +150,8 @@ drain running destination = do
         drain running destination
  where
   change = atomicModifyIORef' (queue running)
-  -- GHC takes this thread for deadlocked together with one in the trace that is, and may go on.
+  -- When GHC finds a thread of the trace deadlocked, it takes this thread for deadlocked, too. But that thread
+  -- may handle the exception, and emit further events.
   awaitWake = takeMVar (wake running) `catch` \BlockedIndefinitelyOnMVar -> awaitWake
   isEmpty q = produced q == 0
   pass n events lost = case destination of
@@ -157,7 +159,7 @@ drain running destination = do
     Batches f -> claiming (n + lost) (traverse settled events >>= f . (++ lostHere))
    where
     lostHere = [Lost lost | lost > 0]
-  -- At the end, 'end' may have counted them as lost: then they are not passed.
+  -- Unless 'end' has counted these events as lost: then they are not passed.
   claiming k act = do
     isMine <- atomicModifyIORef' (inFlight running) (\n -> if n >= k then (n - k, True) else (n, False))
     when isMine act
@@ -220,8 +222,8 @@ instance Exception SinkProblem
 notify :: SinkProblem -> IO ()
 notify problem = void (try (getUncaughtExceptionHandler >>= ($ toException problem)) :: IO (Either SomeException ()))
 
--- | 'notify', for at most a tenth of a second; then it goes on in a thread of its own. GHC's handler flushes
--- 'System.IO.stdout', for which it waits when a sink is blocked that prints.
+-- | 'notify' in a thread of its own, awaited for at most a tenth of a second: GHC's handler flushes
+-- 'System.IO.stdout', and so it blocks while a sink that prints is blocked.
 notifySoon :: SinkProblem -> IO ()
 notifySoon problem = do
   notified <- newIORef False

@@ -73,9 +73,9 @@ reactionText spans started r = intercalate " -> " (changed ++ done)
  where
   (changed, done) = reactionParts spans started r
 
--- | The changes, each with its cause before it; and what the operator stopped, and what it starts. The
--- arguments are the name of each span that it stopped, and when that began; and the name of the first span that
--- it started. Where there is none, the operator's own name of the branch is used, without quotation marks.
+-- | Two lists: the changes, each with its cause before it; and what the operator stopped, and what it starts. The
+-- arguments are the names of the spans that it stopped, each with the time when it began; and the name of the first
+-- span that it started. Where there is none, the operator's own name of the branch is used, without quotation marks.
 --
 -- >>> snd (reactionParts [] Nothing reaction)
 -- ["stopped its task after 3.1 s (took 0.3 s)","recovery"]
@@ -116,7 +116,7 @@ stoppedText :: [String] -> StoppedBranch -> String
 stoppedText [] b = "stopped its " ++ nameText (stoppedName b)
 stoppedText names _ = "stopped " ++ upToThree (map quotedText names)
 
--- The same, and how long they had run at that time: once, if all had run equally long.
+-- The same, and how long the spans had run at that time: said once, if all had run equally long.
 stoppedAfterText :: [(String, Seconds)] -> Seconds -> StoppedBranch -> String
 stoppedAfterText spans time b = case map after spans of
   [] -> stoppedText [] b ++ afterText (stoppedAfter b)
@@ -137,7 +137,7 @@ upToThree texts = intercalate ", " known ++ concat [" and " ++ show (length more
 startedText :: Maybe String -> String -> String
 startedText started branch = maybe (nameText branch) quotedText started
 
--- | The same after what was stopped. If nothing was stopped, it says that this is what starts.
+-- | The same, to follow the text of what was stopped. If nothing was stopped, it begins with \"starts\".
 startsText :: Maybe String -> Reaction -> [String]
 startsText started r =
   [ maybe "starts " (const "") (reactionStopped r) ++ startedText started branch
@@ -162,7 +162,7 @@ changesText changes = case changedOnly changes of
   [] -> "a signal changed"
   known -> intercalate " -> " (map changeText known)
 
--- | Those whose value is another one than before; all, if there are none.
+-- | The changes whose value differs from the one before; or all, if no value differs.
 changedOnly :: [Change] -> [Change]
 changedOnly changes = if any differs changes then filter differs changes else changes
 
@@ -176,7 +176,7 @@ changeText c =
  where
   was value = " (was " ++ inertUpTo 200 value ++ ")"
 
--- | How a span that took that long ended, and why.
+-- | How a span ended that took this long, and why.
 --
 -- >>> endText 1.9 (FailedWith "locked")
 -- "failed after 1.9 s: locked"
@@ -198,13 +198,13 @@ endWith after end = case end of
   StoppedBy cause -> "stopped" ++ after ++ ": " ++ causeText cause
  where
   because why = if null why then "" else ": " ++ inert why
-  -- So begins the text of the library's own failures.
+  -- The texts of the library's own failures begin with it.
   withoutPrefix why = case stripPrefix "the behaviour failed" why of
     Just "" -> ""
     Just (':' : ' ' : reason) -> reason
     _ -> why
 
--- | Why a span was stopped. A branch that has no name but its position is called by that.
+-- | Why a span was stopped. A branch that has only a position is called by its position.
 --
 -- >>> map (causeText . SiblingFinished) ["left", "2", "1, 3", "lidar"]
 -- ["the left branch finished","branch 2 finished","branches 1, 3 finished","\"lidar\" finished"]

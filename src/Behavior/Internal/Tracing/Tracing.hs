@@ -46,8 +46,8 @@ import qualified Behavior.Internal.Tracing.Sink as Sink
 --   ended is /left behind/: its thread remains. Both are reported as a 'Sink.SinkProblem' to GHC's handler
 --   for uncaught exceptions, which prints it to @stderr@.
 --
--- A trace inside another one has a part of the outer one's events. In a simulation the times are
--- virtual, and sinks run outside of it.
+-- What happens in a trace inside another one is in both. In a simulation the times are virtual, and the sinks run
+-- outside of the simulation.
 --
 -- >>> withTrace [] (named "wave" (pure "done"))
 -- "done"
@@ -81,7 +81,7 @@ defaultTraceOptions = TraceOptions {withOperators = False, queueLimit = 100000, 
 withTraceOptions :: TraceOptions -> [Sink] -> Behavior a -> Behavior a
 withTraceOptions options sinks act = do
   limit <- duration "withTrace: waitAtEnd" (waitAtEnd options)
-  _ <- evaluate (length sinks) -- what that throws must not come when some have been started
+  _ <- evaluate (length sinks) -- if the list throws, that must come before any sink has been started
   outside <- myPlace
   outer <- case outside of
     Nothing -> inSimulation (pure (Seconds <$> getMonotonicTime)) (pure . lookAtClock) >>= newTrace
@@ -102,8 +102,8 @@ withTraceOptions options sinks act = do
     uninterruptibleMask_ (Sink.end limit running)
     either (\e -> throwIO (e :: SomeException)) pure end
 
--- | Hands the caller's place in the tree of spans to a thread that this library does not start: the
--- function that it gives runs a behaviour in that place, in any thread.
+-- | Gives a function that runs a behaviour in the caller's place in the tree of spans, in any thread: for
+-- threads that this library does not start.
 --
 -- > adopt >>= \here -> forkIO (here act)
 --
