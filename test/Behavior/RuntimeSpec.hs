@@ -20,9 +20,10 @@ import System.Mem (performMajorGC)
 import Test.Hspec hiding (parallel)
 
 import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
-import Behavior.Internal.Concurrent.Scope hiding (Outcome (..))
+import Behavior.Internal.Concurrent.Outcome (outcomeToIO)
+import Behavior.Internal.Concurrent.Scope
 import Behavior.Internal.Core.Cause (Cause (..))
-import Behavior.Internal.Core.Property (mistakeOf, testing)
+import Behavior.Internal.Core.Property (keepMistake, mistakeOf, testing)
 import Behavior.Internal.Core.Stop (Stop (..), causeOf)
 import Behavior.Internal.Seam.Runtime
 import qualified Behavior.Signal as Signal

@@ -16,6 +16,7 @@ import Control.Exception (Exception (..), SomeException, catch, mask, throwIO, t
 import Control.Monad (join, void, when)
 import System.IO.Unsafe (unsafePerformIO)
 
+import Behavior.Internal.Concurrent.Outcome (Outcome (..))
 import Behavior.Internal.Concurrent.Scope
 import Behavior.Internal.Core.Cause (Cause)
 import Behavior.Internal.Core.Failure (Behavior)

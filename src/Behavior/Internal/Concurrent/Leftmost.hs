@@ -18,7 +18,7 @@ module Behavior.Internal.Concurrent.Leftmost
 import Control.Concurrent.STM (STM, TVar, newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception (SomeException)
 
-import Behavior.Internal.Concurrent.Scope (Outcome, result)
+import Behavior.Internal.Concurrent.Outcome (Outcome, result)
 
 -- | What the leftmost branch that has published anything published, and the branch's number.
 newtype Leftmost x = Leftmost (TVar (Maybe (Int, x)))

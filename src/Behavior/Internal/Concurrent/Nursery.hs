@@ -27,6 +27,7 @@ import Control.Monad.Catch (MonadThrow)
 import Data.Foldable (asum, traverse_)
 
 import Behavior.Internal.Concurrent.Leftmost
+import Behavior.Internal.Concurrent.Outcome (Outcome (..), result)
 import Behavior.Internal.Concurrent.Scope hiding (requestStop)
 import Behavior.Internal.Core.Cause (Cause (..))
 import Behavior.Internal.Core.Failure

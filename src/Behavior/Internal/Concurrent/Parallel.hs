@@ -31,6 +31,7 @@ import Data.Maybe (isNothing)
 import Data.Traversable (mapAccumL)
 
 import Behavior.Internal.Concurrent.Leftmost
+import Behavior.Internal.Concurrent.Outcome (Outcome (..), outcomeToIO, result)
 import Behavior.Internal.Concurrent.Scope
 import Behavior.Internal.Core.Cause (Cause (..))
 import Behavior.Internal.Core.Failure (Behavior, BehaviorFailed, failWith, failed)

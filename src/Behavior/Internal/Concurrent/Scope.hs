@@ -41,11 +41,8 @@ module Behavior.Internal.Concurrent.Scope
   , requestStop
 
     -- * How a branch ends
-  , Outcome (..)
   , completedNow
-  , outcomeToIO
   , endedBy
-  , result
   ) where
 
 import Control.Concurrent (ThreadId)

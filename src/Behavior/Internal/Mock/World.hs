@@ -36,6 +36,7 @@ import Data.IORef
 import Data.Maybe (isJust, isNothing)
 
 import Behavior.Internal.Core.Failure (Behavior)
+import Behavior.Internal.Core.Property (Property, keepMistake, keepPremises)
 import Behavior.Internal.Mock.Claim (Claim, premisesIn, verdict)
 import Behavior.Internal.Mock.Record
 import Behavior.Internal.Mock.Subject

@@ -16,6 +16,7 @@ module Behavior.Internal.Reactive.Engine
 import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
 
+import Behavior.Internal.Concurrent.Outcome (Outcome (..), outcomeToIO, result)
 import Behavior.Internal.Concurrent.Scope
 import Behavior.Internal.Core.Cause (Cause (..))
 import Behavior.Internal.Core.Failure (Behavior)

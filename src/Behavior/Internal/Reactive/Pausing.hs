@@ -14,6 +14,7 @@ import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
 import Control.Exception (mask_, throwIO, try)
 import Control.Monad (unless)
 
+import Behavior.Internal.Concurrent.Outcome (Outcome (..), outcomeToIO)
 import Behavior.Internal.Concurrent.Repeating (sleepForever)
 import Behavior.Internal.Concurrent.Scope
 import Behavior.Internal.Core.Cause (Cause (..))

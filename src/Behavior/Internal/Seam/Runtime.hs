@@ -36,10 +36,7 @@ module Behavior.Internal.Seam.Runtime
   , announce
   , announceStart
   , simulatedRun
-  , Property
   , currentProperty
-  , keepMistake
-  , keepPremises
   ) where
 
 import Control.Concurrent (getNumCapabilities, yield)

@@ -42,6 +42,7 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException)
 import Data.Traversable (for)
 
+import Behavior.Internal.Concurrent.Outcome (Outcome (..))
 import Behavior.Internal.Concurrent.Scope
 import Behavior.Internal.Core.Failure (failWith)
 import Behavior.Internal.Seam.Runtime
