@@ -149,9 +149,9 @@ tryExplore plan property = case planSearch plan of
 
   reduced i e t = do
     (fewer, e') <- shrunk (deviations t) e
-    (fewest, e'') <- simplest fewer e'
+    (fewest, lastWhy) <- simplest fewer e'
     again <- tryRun o {detailedSteps = True} (preempting True fewest) property
-    let why = fromMaybe (toException (Unrepeatable (planShowException plan e''))) (thrown again)
+    let why = fromMaybe (toException (Unrepeatable (planShowException plan lastWhy))) (thrown again)
     pure (counterexample (Preempting fewest) why again i)
 
   -- Leaving out one pre-emption changes the numbers of the later points, so the remaining

@@ -171,7 +171,7 @@ divergences outer depth xs ys rest = foldr compared (reordered ++ rest) (Map.toL
     , (itemBegan y', itemEnded y') /= (itemBegan y, itemEnded y)
     ]
   diverged :: Int -> (String, Int) -> Seconds -> String -> String -> Diverged
-  diverged rank (name, n) at did did' = ((rank, depth), Divergence at (inPath name outer) n did did')
+  diverged rank (name, n) at leftDid rightDid = ((rank, depth), Divergence at (inPath name outer) n leftDid rightDid)
 
 type Diverged = ((Int, Int), Divergence)
 

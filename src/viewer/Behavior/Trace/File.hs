@@ -73,9 +73,9 @@ withTraceFile path action = closing $ \file broken -> do
   zero <- now
   header <- Header <$> getCurrentTime
   lock <- newMVar ()
-  let add lines' = do
+  let add encoded = do
         -- Computing a text may throw. So all of them are computed before any is written.
-        bytes <- evaluate (Bytes.toStrict (toLazyByteString lines'))
+        bytes <- evaluate (Bytes.toStrict (toLazyByteString encoded))
         withMVar lock $ \() -> do
           readIORef broken >>= \is -> when is (throwIO (userError (path ++ ": an earlier event could not be written")))
           naming (unsafeUseAsCStringLen bytes (\(start, size) -> write file (castPtr start) 0 size))
@@ -190,7 +190,7 @@ parseTrace bytes = case Bytes.split '\n' bytes of
     content : after -> case decodeSharing texts content of
       Right (Lost more, _)
         | more > maxBound - lostBefore -> Left (DamagedLine n "more events were lost than can be counted")
-      Right (this, texts') -> go (n + 1) texts' (lostBefore + lostIn this) (this : before) after
+      Right (this, textsAfter) -> go (n + 1) textsAfter (lostBefore + lostIn this) (this : before) after
       Left (NotJson _) | null after -> Right (reverse before, Just (TornLine n (fromIntegral (Bytes.length content))))
       Left (NotJson why) -> Left (DamagedLine n ("this is not a line of JSON: " ++ why))
       Left (NotAnEvent why) -> Left (DamagedLine n ("this is no event: " ++ why))

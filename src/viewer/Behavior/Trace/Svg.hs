@@ -93,11 +93,11 @@ timeline recorded =
     | total > 0, v <- fromSeconds (t - recordingFrom r) / fromSeconds total, not (isNaN v) = v
     | otherwise = 0
   tick (t, label) =
-    [ shape "gl" (Text.concat ["M", px (x' t), " ", px (axisTop + 6), "V", px bottom])
-    , textAt "q c" (x' t) axisTop [("", label)]
+    [ shape "gl" (Text.concat ["M", px (pixelOf t), " ", px (axisTop + 6), "V", px bottom])
+    , textAt "q c" (pixelOf t) axisTop [("", label)]
     ]
    where
-    x' = x . (recordingFrom r +) . realToFrac
+    pixelOf = x . (recordingFrom r +) . realToFrac
   -- What is free of texts beside bars.
   free p =
     foldl
@@ -130,27 +130,27 @@ ticks total
 
 bar :: Int -> (Int -> Double) -> Double -> Recording -> IntMap Double -> Mark -> Element
 bar limit y h r stopRequests m
-  | isMerged m || w < 3 = path (Text.unwords ["m", class']) (markShape outcome (markLeft m) top (max 1.5 w) h) about
-  | otherwise = group "" (path (Text.unwords ["b", class']) (barShape outcome (markLeft m) top w h) about : stopping)
+  | isMerged m || w < 3 = path (Text.unwords ["m", classes]) (markShape outcome (markLeft m) top (max 1.5 w) h) about
+  | otherwise = group "" (path (Text.unwords ["b", classes]) (barShape outcome (markLeft m) top w h) about : stopping)
  where
   outcome = markOutcome m
-  class' =
+  classes =
     if isMerged m && outcome `elem` [Success, RanAgain, CutShort] && w >= 3
       then "v2 " <> outcomeClass outcome
       else outcomeClass outcome
   top = y (markLane m)
   w = markRight m - markLeft m
   about = titled $ if isMerged m then severalSpans m else aboutSpan limit r (markNode m)
-  stopping = [shape "h" (barShape Stop from' top (markRight m - from') h) | Just from' <- [stoppingFrom stopRequests m]]
+  stopping = [shape "h" (barShape Stop left top (markRight m - left) h) | Just left <- [stoppingFrom stopRequests m]]
 
 -- Where the hatched part of a bar begins, if it can be seen: the time from the request to stop until it had stopped.
 stoppingFrom :: IntMap Double -> Mark -> Maybe Double
 stoppingFrom stopRequests m = case nodeEnd (markNode m) of
   Just (_, StoppedBy (SignalChanged n _))
     | Just request <- IntMap.lookup n stopRequests
-    , let from' = max (markLeft m) request
-    , not (isMerged m) && markRight m - markLeft m >= 3 && markRight m - from' > 2 ->
-        Just from'
+    , let begin = max (markLeft m) request
+    , not (isMerged m) && markRight m - markLeft m >= 3 && markRight m - begin > 2 ->
+        Just begin
   _ -> Nothing
 
 severalSpans :: Mark -> [String]

@@ -98,12 +98,12 @@ name right h used m next
   | isMerged m && inside < 60 = nothingFits
   | single, isExplained, after >= partsWidth full = behind full True
   | inside >= partsWidth short = inBar short False
-  | Just (lines', False) <- stacked = onTwo lines'
+  | Just (both, False) <- stacked = onTwo both
   | inside >= smallWidth - 6 = small (nameOf m)
   | single, after >= partsWidth full = behind full True
   | single, after >= partsWidth short = behind short False
   | single, next >= right, markLeft m - used - 22 >= partsWidth short = before
-  | Just (lines', _) <- stacked = onTwo lines'
+  | Just (both, _) <- stacked = onTwo both
   | isReadable cut = small cut
   | otherwise = nothingFits
  where
@@ -193,7 +193,7 @@ onTwoLines room text = case (filter fits breaks, takeWhile ((<= room) . textWidt
  where
   breaks = [(unwords a, unwords b) | k <- [1 .. length parts - 1], let (a, b) = splitAt k parts]
   parts = words (take 200 text)
-  fits lines' = widest lines' <= room
+  fits both = widest both <= room
   widest (a, b) = max (textWidth a) (textWidth b)
 
 nameOf :: Mark -> String

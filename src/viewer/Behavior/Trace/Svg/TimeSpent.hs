@@ -29,14 +29,14 @@ data Taken = Taken String Seconds [Node]
 -- Where several with parts run side by side, these are the times of their parts, and the whole is the sum.
 whereTimeWent :: Double -> Recording -> [Part]
 whereTimeWent width r =
-  ("q", lead) : last (fallback' : take 1 (filter ((<= width) . partsWidth . (("q", lead) :)) texts))
+  ("q", lead) : last (shortest : take 1 (filter ((<= width) . partsWidth . (("q", lead) :)) texts))
  where
   (taken, total, sideBySide) = fromMaybe (mostOf r, recordingUntil r - recordingFrom r, 0) (sideBySideOf r)
   lead = case listed of
     _ | sideBySide > 0 -> show sideBySide ++ " side by side, together " ++ secondsText total ++ ":"
     Taken _ t _ : _ : _ | t < 0.2 * total -> "spread over " ++ some (length listed) "part" ++ ", the longest:"
     _ -> "time:"
-  fallback' = last ([("", "nothing took time")] : texts)
+  shortest = last ([("", "nothing took time")] : texts)
   texts =
     [ shown k (rest k)
     | not (null listed)
