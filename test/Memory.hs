@@ -50,9 +50,9 @@ liveBytes = do
 -- | The number of bytes that all threads have allocated while the action ran.
 allocatedBy :: IO a -> IO Int64
 allocatedBy act = do
-  before' <- allocated
+  bytesBefore <- allocated
   _ <- act
-  subtract before' <$> allocated
+  subtract bytesBefore <$> allocated
  where
   -- (Only a collection makes the number exact.)
   allocated = performMajorGC >> fromIntegral . allocated_bytes <$> getRTSStats

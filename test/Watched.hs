@@ -147,7 +147,7 @@ newRecorded initial = do
           value <- readTVar var
           unsafeIOToSTM $ do
             self <- myThreadId
-            value <$ atomicModifyIORef' seen (\all' -> ((self, value) : all', ()))
+            value <$ atomicModifyIORef' seen (\known -> ((self, value) : known, ()))
       , readCount = \meant value ->
           length . takeWhile ((== value) . snd) . filter (meant . fst) <$> readIORef seen
       }

@@ -60,9 +60,9 @@ spec = guarded . describe "abandoning" $ do
 
     it "is never abandoned under any schedule if it ends in time, and always if it does not" $
       for_ [(2.5, 0), (1.5, 1)] $ \(limit, expected) ->
-        void . explore (exhaustively 1) $ \simulate' -> do
+        void . explore (exhaustively 1) $ \simulated -> do
           abandoned <- newIORef (-1)
-          _ <- simulate' $ do
+          _ <- simulated $ do
             timeout 1 (abandoning limit (hang `onException` uninterruptibleMask_ (sleep 2))) ? pure ()
             abandonedCount >>= writeIORef abandoned
             sleep 5
@@ -78,9 +78,9 @@ spec = guarded . describe "abandoning" $ do
       started `shouldNotContain` [Started (Label "abandoning" "watcher")]
 
     it "is counted right under any schedule if it ends just as its time is up" $
-      void . explore (exhaustively 1) $ \simulate' -> do
+      void . explore (exhaustively 1) $ \simulated -> do
         counted <- newIORef (-1)
-        _ <- simulate' $ do
+        _ <- simulated $ do
           timeout 1 (abandoning 2 (hang `onException` uninterruptibleMask_ (sleep 2))) ? pure ()
           sleep 1
           abandonedCount >>= writeIORef counted

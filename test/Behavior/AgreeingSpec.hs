@@ -65,8 +65,8 @@ spec = guarded . describe "agreeing" $ do
         `shouldReturn` (0, Left ("FailedBecause \"no " ++ show m ++ " of 200 agree\""))
 
   it "gives results that agree under all schedules of sensors that answer at the same time"
-    . void . explore (exhaustively 1) $ \simulate' ->
-      (simulate' (agreeing 2 (==) [pure 'a', pure 'b', pure 'a']) >>= returned) `shouldReturn` "aa"
+    . void . explore (exhaustively 1) $ \simulated ->
+      (simulated (agreeing 2 (==) [pure 'a', pure 'b', pure 'a']) >>= returned) `shouldReturn` "aa"
 
 -- | What 'agreeing' gives, and when, if each behaviour answers a second after the one before.
 defined :: Int -> (a -> a -> Bool) -> [a] -> (Seconds, Either String [a])

@@ -241,12 +241,12 @@ stale = do
       source <- Source.open (Signal.staleAfter 1 (Signal.polling 1 (hang :: IO ()))) Source.everyValue
       let isStale seen = ((False <$ Source.firstRead seen) `orElse` pure False) `catchSTM` \(_ :: Failed) -> pure True
       structured "test" $ \scope -> do
-        (before', workers) <- startSensors scope source
+        (viewBefore, workers) <- startSensors scope source
         sleep 1.5
         requestStopAsync (SiblingFinished "test") (map SomeBranch workers)
         for_ workers (atomically . outcome)
-        (after', _) <- startSensors scope source
-        traverse (atomically . isStale) [before', after'] >>= writeIORef found
+        (viewAfter, _) <- startSensors scope source
+        traverse (atomically . isStale) [viewBefore, viewAfter] >>= writeIORef found
         pure (Verdict (SiblingFinished "test") (pure ()))
     readIORef found `shouldReturn` [True, False]
 

@@ -85,11 +85,11 @@ spec = guarded . describe "cleanupWithin" $ do
 notParked :: (Behavior () -> Behavior ()) -> IO Int
 notParked cleanup = do
   count <- newIORef 0
-  _ <- explore (exhaustively 1) $ \simulate' -> do
+  _ <- explore (exhaustively 1) $ \simulated -> do
     parked <- newIORef False
     let park = sleep 1 >> writeIORef parked True
         cancel thread = throwToAll (const (Cancel "the arm")) [threadId thread]
-    _ <- simulate' $ do
+    _ <- simulated $ do
       arm <- mask_ (start (Label "arm" "") (sleep 3600 `onException` cleanup park))
       sleep 2 >> cancel arm >> sleep 0.5 >> cancel arm
       atomically (threadEnd arm)

@@ -53,9 +53,9 @@ asking = do
                      ]
 
   it "about more ends each time, and at last about all, under all schedules" $ do
-    report <- explore (exhaustively 2) $ \simulate' -> do
+    report <- explore (exhaustively 2) $ \simulated -> do
       (asked, remember) <- recorder
-      run <- simulate' (decide (\ends -> remember ends (pure () <$ sequence ends)) [pure 'a', pure 'b', pure 'c'])
+      run <- simulated (decide (\ends -> remember ends (pure () <$ sequence ends)) [pure 'a', pure 'b', pure 'c'])
       returned run ()
       counts <- map (length . catMaybes) <$> asked
       unless (head counts == 0 && last counts == 3 && and (zipWith (<) counts (drop 1 counts))) $ fail (show counts)
@@ -211,8 +211,8 @@ returned run a = case outcome run of
 allEnds :: Show a => Behavior a -> IO ([String], Int)
 allEnds act = do
   found <- newIORef []
-  report <- explore (exhaustively 1) $ \simulate' -> do
-    run <- simulate' act
+  report <- explore (exhaustively 1) $ \simulated -> do
+    run <- simulated act
     modifyIORef' found (endOf (outcome run) :)
   ends <- nub . sort <$> readIORef found
   pure (ends, reportSchedules report)

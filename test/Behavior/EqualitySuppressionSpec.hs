@@ -115,8 +115,8 @@ differentReadings = do
   it "and cannot be compared takes precedence over one to its right, when both are found at once" $ do
     let left = toException (Fault "left")
         incomparable e = Signal.debounce 1 (Incomparable e <$> time)
-        both' = (,) <$> incomparable left <*> incomparable (toException (Fault "right"))
-    minute (Signal.withShared both' (\s -> sleep 10 >> Signal.switch s (const hang))) `shouldReturn` (show left, 10)
+        pair = (,) <$> incomparable left <*> incomparable (toException (Fault "right"))
+    minute (Signal.withShared pair (\s -> sleep 10 >> Signal.switch s (const hang))) `shouldReturn` (show left, 10)
 
 -- | Cannot be compared from second 5 on.
 data Incomparable = Incomparable SomeException Seconds

@@ -291,20 +291,20 @@ attempts = do
         `shouldReturn` (endingOf (Left e), "a")
 
   it "can be cancelled in every try, and then makes no further one" $
-    for_ [1 .. 3 :: Int] $ \try' -> do
+    for_ [1 .. 3 :: Int] $ \nth -> do
       entries <- newLog
       inside <- newGate
       let act = do
             note entries ()
             tries <- length <$> notes entries
-            if tries == try' then open inside >> hang else failed
+            if tries == nth then open inside >> hang else failed
       cancelling (attempt 3 act) (pass inside)
         `shouldReturn` (CancelledBy (show (Cancel "the caller")) :: Ending ())
-      length <$> notes entries `shouldReturn` try'
+      length <$> notes entries `shouldReturn` nth
 
   it "composes with a behaviour that takes an argument" $ do
-    let open' entries door = note entries door >> failed :: IO ()
-    snd <$> observing (\entries -> (attempt 2 . open' entries) "front")
+    let openNoting entries door = note entries door >> failed :: IO ()
+    snd <$> observing (\entries -> (attempt 2 . openNoting entries) "front")
       `shouldReturn` ["front", "front"]
 
   inCallersState "every try" $ \act -> do
@@ -380,9 +380,9 @@ failingOns = do
     (end, done) <- observing $ \entries ->
       timeout 0.001 (failingOn everything hang ? note entries "went on")
     (end, done) `shouldBe` (FailedWith (show (TimedOut 0.001)), [])
-    (end', done') <- observing $ \entries ->
+    (endOutside, doneOutside) <- observing $ \entries ->
       System.timeout 1000 (failingOn everything hang ? note entries "went on")
-    (end', done') `shouldBe` (Gave Nothing, [])
+    (endOutside, doneOutside) `shouldBe` (Gave Nothing, [])
 
   inCallersState "its behaviour" (failingOn everything)
  where
@@ -482,13 +482,13 @@ predict count expression = case expression of
   Over [a] -> predict count a
   Over (a : as) -> predict count a `orOnFailure` (`predict` Over as)
   a :> b -> case predict count a of
-    (Gave _, count', done) -> done `before'` predict count' b
+    (Gave _, count', done) -> done `precedes` predict count' b
     other -> other
  where
   noTry = (FailedWith (show Failed), count, [])
-  orOnFailure (FailedWith _, count', done) second = done `before'` second count'
+  orOnFailure (FailedWith _, count', done) second = done `precedes` second count'
   orOnFailure other _ = other
-  before' done (end, count', done') = (end, count', done ++ done')
+  precedes done (end, count', done') = (end, count', done ++ done')
   inPure end = case end of
     Succeeds n -> Gave n
     Fails why -> FailedWith (show (Failure why))

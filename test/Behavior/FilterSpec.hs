@@ -241,8 +241,8 @@ flickering lasting values = do
     end <- awaitEnd caller
     over <- now
     case end of
-      Gave (value, t) -> pure (value, t, zipWith until' phases (map readAt (drop 1 phases) ++ [over]))
+      Gave (value, t) -> pure (value, t, zipWith heldTo phases (map readAt (drop 1 phases) ++ [over]))
       _ -> throwIO (userError ("it ended with " ++ show end))
  where
   readAt (_, _, t) = t
-  until' (value, from, _) to = (value, from, to)
+  heldTo (value, from, _) to = (value, from, to)

@@ -81,12 +81,12 @@ camera = Fault "camera"
 remainingUp :: Behavior () -> (Signal.Signal Bool -> Behavior () -> Behavior () -> Behavior ()) -> IO Int
 remainingUp closing interrupting = do
   up <- newIORef 0
-  _ <- explore (exhaustively 1) $ \simulate' -> do
+  _ <- explore (exhaustively 1) $ \simulated -> do
     windy <- newTVarIO False
     flying <- newTVarIO True
     let wind = sleep 5 >> atomically (writeTVar windy True) >> sleep 1 >> atomically (writeTVar windy False) >> sleep 20
         land = sleep 4 >> atomically (writeTVar flying False)
         survey = (atomically (writeTVar flying True) >> sleep 3600) `onException` closing
-    _ <- simulate' (interrupting (watchedVar windy) land survey ||| wind)
+    _ <- simulated (interrupting (watchedVar windy) land survey ||| wind)
     readTVarIO flying >>= \is -> when is (modifyIORef' up (+ 1))
   readIORef up

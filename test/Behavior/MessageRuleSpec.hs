@@ -72,9 +72,9 @@ rule = do
   it "is interrupted by a rule before it also if the handler completes nevertheless" $ do
     done <- newTVarIO ""
     danger <- newTVarIO False
-    _ <- explore (randomly 100) $ \simulate' -> do
+    _ <- explore (randomly 100) $ \simulated -> do
       atomically (writeTVar done "" >> writeTVar danger False)
-      _ <- simulate' . withInbox 9 (delivering "ab") $ \box -> do
+      _ <- simulated . withInbox 9 (delivering "ab") $ \box -> do
         handling <- messageRule box (\m -> modifyTVar' done (m :) <$ (try (sleep 9) :: IO (Either SomeException ())))
         Signal.teleoReactive [(Signal.watching (readTVar danger), sleep 1), handling]
           `both` (sleep 1 >> atomically (writeTVar danger True))
@@ -93,10 +93,10 @@ rule = do
   it "lets the rules after it run while another robot handles the only message" $ do
     patrols <- newIORef (0 :: Int)
     handled <- newIORef (0 :: Int)
-    _ <- explore (randomly 100) $ \simulate' -> do
+    _ <- explore (randomly 100) $ \simulated -> do
       writeIORef patrols 0
       writeIORef handled 0
-      _ <- simulate' . withInbox 9 (delivering "a") $ \box -> do
+      _ <- simulated . withInbox 9 (delivering "a") $ \box -> do
         let robot = do
               handling <- messageRule box (\_ -> sleep 10 >> pure () <$ modifyIORef' handled (+ 1))
               Signal.teleoReactive [handling, (pure True, forever (sleep 1 >> modifyIORef' patrols (+ 1)))]
@@ -151,7 +151,7 @@ drone = do
           alarms = forever $ do
             replicateM_ 3 yield >> modifyIORef' dangers (+ 1)
             atomically (writeTVar danger True) >> atomically (readTVar danger >>= check . not)
-          untilAllAreDone = readTVarIO done >>= \all' -> unless (length all' == 300) hang
+          untilAllAreDone = readTVarIO done >>= \committed -> unless (length committed == 300) hang
       alarms
         ||| Signal.teleoReactive
           [(Signal.watching (readTVar danger), flee), handling, (pure True, untilAllAreDone)]
@@ -170,7 +170,7 @@ three = [[Message 1], [Danger], [Message 2], [Danger, Message 3]]
 wrong :: Plan -> Day -> Way -> IO [String]
 wrong plan day way = do
   mistakes <- newIORef []
-  _ <- explore plan $ \simulate' -> do
+  _ <- explore plan $ \simulated -> do
     danger <- newTVarIO False
     done <- newTVarIO []
     begun <- newIORef (0 :: Int)
@@ -179,17 +179,17 @@ wrong plan day way = do
         flee = sleep 0.5 >> atomically (writeTVar danger False) >> hang
         comes (Message m) = readIORef callback >>= ($ m)
         comes Danger = atomically (writeTVar danger True)
-    _ <- simulate' . withInbox 5 (\deliver -> pure () <$ writeIORef callback deliver) $ \box -> do
+    _ <- simulated . withInbox 5 (\deliver -> pure () <$ writeIORef callback deliver) $ \box -> do
       handling <- way box handle
       Signal.teleoReactive [(Signal.watching (readTVar danger), flee), handling, (pure True, hang)]
         ||| (for_ day (\news -> sleep 1 >> traverse_ comes news) >> sleep 9)
-    all' <- readTVarIO done
+    committed <- readTVarIO done
     n <- readIORef begun
     let messages = [m | Message m <- concat day]
         miscounted =
           [ show m ++ " was committed " ++ show k ++ " times"
           | m <- messages
-          , let k = length (filter (== m) all')
+          , let k = length (filter (== m) committed)
           , k /= 1
           ]
         -- An interruption makes one begin again; so may the commit of the message before it.
@@ -216,8 +216,8 @@ takenAtReturn :: Way
 takenAtReturn box handle = do
   known <- newTVarIO Nothing
   let peek = readTVar known >>= maybe (receive box >>= \m -> m <$ writeTVar known (Just m)) pure
-      some = (||) <$> someUnhandled' <*> (not . null <$> readTVar known)
-      someUnhandled' = (> 0) <$> unhandled box
+      some = (||) <$> anyUnhandled <*> (not . null <$> readTVar known)
+      anyUnhandled = (> 0) <$> unhandled box
   pure
     ( Signal.watching some
     , forever (atomically peek >>= handle >>= atomically >> atomically (writeTVar known Nothing))
@@ -244,10 +244,10 @@ counting = do
     readTVarIO counted `shouldReturn` 1
 
   it "no longer counts a message where the effect of its transaction is seen" $
-    void . explore (exhaustively 1) $ \simulate' -> do
+    void . explore (exhaustively 1) $ \simulated -> do
       done <- newTVarIO False
       found <- newIORef (-1)
-      _ <- simulate' . withInbox 9 (delivering "a") $ \box ->
+      _ <- simulated . withInbox 9 (delivering "a") $ \box ->
         handleNext box (\_ -> pure (writeTVar done True))
           `both` (atomically (readTVar done >>= check >> unhandled box) >>= writeIORef found)
       readIORef found `shouldReturn` 0

@@ -133,9 +133,9 @@ handlingEach = do
     sort <$> readTVarIO done `shouldReturn` [1 .. 300]
 
   it "goes on with its task if another consumer has taken the message" $
-    void . explore (randomly 300) $ \simulate' -> do
+    void . explore (randomly 300) $ \simulated -> do
       begun <- newTVarIO (0 :: Int)
-      run <- simulate' . withInbox 1 (\deliver -> pure () <$ deliver 'a') $ \box -> do
+      run <- simulated . withInbox 1 (\deliver -> pure () <$ deliver 'a') $ \box -> do
         let consume = onMessage box (\_ -> pure (pure ())) (atomically (modifyTVar' begun (+ 1)) >> hang)
         (consume `both` consume) ||| atomically (readTVar begun >>= check . (== 2))
       explain (outcome run) `shouldBe` explain (Returned ())
@@ -144,13 +144,13 @@ handlingEach = do
     withInbox 9 (delivering "abc") $ \box -> do
       let failing entered mayEnd =
             ending (handleNext box (\_ -> open entered >> pass mayEnd >> failed) :: Behavior ())
-      [entered, entered', mayEnd, mayEnd'] <- replicateM 4 newGate
+      [entered, enteredNext, mayEnd, mayEndNext] <- replicateM 4 newGate
       withThread (failing entered mayEnd) $ \first ->
-        pass entered >> withThread (failing entered' mayEnd') (\second -> do
-          pass entered'
+        pass entered >> withThread (failing enteredNext mayEndNext) (\second -> do
+          pass enteredNext
           open mayEnd
           _ <- awaitEnd first
-          open mayEnd'
+          open mayEndNext
           void (awaitEnd second))
       atomically (allOf box) `shouldReturn` "abc"
 
@@ -222,14 +222,14 @@ threeOrders = ([1, 2, 3], newMock >>= \world -> driver world "orders" [(1, 1), (
 miscounted :: Plan -> ([Int], IO ((Int -> IO ()) -> IO (IO ())), [Seconds]) -> Handling -> IO [Int]
 miscounted plan (expected, newDriver, lows) handlingBy = do
   wrong <- newIORef []
-  _ <- explore plan $ \simulate' -> do
+  _ <- explore plan $ \simulated -> do
     orders <- newDriver
     low <- newTVarIO False
     done <- newTVarIO []
     let serve order = sleep 1 >> pure (modifyTVar' done (order :))
         recharge = sleep 0.5 >> atomically (writeTVar low False)
         drains = for_ (zipWith (-) lows (0 : lows)) $ \pause -> sleep pause >> atomically (writeTVar low True)
-    _ <- simulate' . handlingBy orders $ \onEach ->
+    _ <- simulated . handlingBy orders $ \onEach ->
       Signal.monitor (Signal.watching (readTVar low)) recharge (onEach serve hang) ||| (drains >> sleep 9)
     orderList <- readTVarIO done
     let counts = [length (filter (== order) orderList) | order <- expected]
@@ -260,7 +260,7 @@ queued handleOne orders act = do
 mockDriver :: Spec
 mockDriver = do
   it "delivers each message at its time, and nothing that was due before the subscription or is due after its end" $ do
-    (world, orders) <- world'
+    (world, orders) <- newWorld
     got <- newIORef []
     let stamped m = now >>= \t -> modifyIORef' got ((m, t) :)
     _ <- simulate $ do
@@ -275,7 +275,7 @@ mockDriver = do
       `shouldReturn` ["orders: subscribed", "orders: 'b'", "orders: unsubscribed"]
 
   it "records each message" $ do
-    (world, orders) <- world'
+    (world, orders) <- newWorld
     _ <- simulate (withInbox 9 orders (\_ -> sleep 5))
     for_ "abc" $ \m -> world `shouldRecord` eventually (noted ("orders: " ++ show m))
 
@@ -285,7 +285,7 @@ mockDriver = do
       , (throwIO ThreadKilled, CancelledBy "thread killed")
       ]
       $ \(callback, expected) -> do
-          (_, orders) <- world'
+          (_, orders) <- newWorld
           ended <- newIORef Nothing
           _ <- simulate $ ending (orders (const callback) >>= (sleep 2 >>)) >>= writeIORef ended . Just
           readIORef ended `shouldReturn` Just expected
@@ -300,7 +300,7 @@ mockDriver = do
     refused [(1, 'a')]
       `shouldReturn` FaultedWith "driver \"orders\": something else in this world has this name already"
  where
-  world' = newMock >>= \world -> (,) world <$> driver world "orders" [(1, 'a'), (2, 'b'), (3, 'c')]
+  newWorld = newMock >>= \world -> (,) world <$> driver world "orders" [(1, 'a'), (2, 'b'), (3, 'c')]
 
 -- | A driver that delivers the messages as soon as it is subscribed to.
 delivering :: [e] -> (e -> IO ()) -> IO (IO ())

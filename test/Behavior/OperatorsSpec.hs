@@ -55,7 +55,7 @@ spec = guarded . for_ operators $ \op -> describe (show op) $ do
           pass entered
           set condition (Value False)
           void (awaitEnd caller)
-        notes states >>= (`shouldSatisfy` \all' -> not (null all') && all (== Unmasked) all')
+        notes states >>= (`shouldSatisfy` \known -> not (null known) && all (== Unmasked) known)
 
   it "ends after the cleanup of its branch, though the caller is cancelled twice" $ do
     entries <- newLog

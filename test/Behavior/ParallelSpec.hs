@@ -20,7 +20,7 @@ import Support
 spec :: Spec
 spec = guarded $ do
   describe "Which outcome, when several things happened" $ do
-    for_ [parallel', both', firstOf', allOf', scoped'] outcomes
+    for_ [parallelOperator, bothOperator, firstOfOperator, allOfOperator, scopedOperator] outcomes
     ties
   describe "parallel and both" $ do
     starting
@@ -84,12 +84,12 @@ data Operator = Operator
   , apply :: [Behavior Int] -> Behavior [Int]
   }
 
-parallel', both', firstOf', allOf', scoped' :: Operator
-parallel' = Operator "parallel" Race False ("left", "right") (const []) (pairwise parallel)
-both' = Operator "both" Gather False ("left", "right") (const []) (pairwise both)
-firstOf' = Operator "firstOf" Race True ("the first", "the second") id (fmap pure . firstOf)
-allOf' = Operator "allOf" Gather True ("the first", "the second") id allOf
-scoped' = Operator "scoped" Nursery False ("the body", "the fork") id $ \case
+parallelOperator, bothOperator, firstOfOperator, allOfOperator, scopedOperator :: Operator
+parallelOperator = Operator "parallel" Race False ("left", "right") (const []) (pairwise parallel)
+bothOperator = Operator "both" Gather False ("left", "right") (const []) (pairwise both)
+firstOfOperator = Operator "firstOf" Race True ("the first", "the second") id (fmap pure . firstOf)
+allOfOperator = Operator "allOf" Gather True ("the first", "the second") id allOf
+scopedOperator = Operator "scoped" Nursery False ("the body", "the fork") id $ \case
   body : forked -> scoped $ \nursery -> traverse_ (fork nursery) (take 1 forked) >> pure <$> body
   [] -> pure []
 
@@ -212,7 +212,7 @@ runBranchesIn order operator isCancelled branches = do
 -- | An example for each cell of the table of plans.
 outcomes :: Operator -> Spec
 outcomes operator = describe (called operator) $ do
-  for_ [(one, other, isCancelled) | one <- all', other <- all', isCancelled <- [False, True]] $
+  for_ [(one, other, isCancelled) | one <- everyPlan, other <- everyPlan, isCancelled <- [False, True]] $
     \(one, other, isCancelled) -> do
       let branches = testBranches [one, other]
           end = case predicted (kind operator) isCancelled branches of
@@ -233,7 +233,7 @@ outcomes operator = describe (called operator) $ do
  where
   orders = [minBound .. maxBound]
   allAre end = conjoin . map (=== end)
-  all' = [minBound .. maxBound]
+  everyPlan = [minBound .. maxBound]
   sentence one other isCancelled =
     fst (members operator) ++ " " ++ describePlan one ++ ", " ++ snd (members operator) ++ " " ++ describePlan other
       ++ (if isCancelled then ", and the caller is cancelled" else "")
@@ -326,16 +326,16 @@ laws = do
   it "parallel is firstOf of two" $
     forAllBranches $ \branches ->
       (===)
-        <$> (voided <$> runBranches parallel' False branches)
-        <*> (voided <$> runBranches firstOf' False branches)
+        <$> (voided <$> runBranches parallelOperator False branches)
+        <*> (voided <$> runBranches firstOfOperator False branches)
   it "both is allOf of two" $
     forAllBranches $ \branches ->
       (===)
-        <$> (voided <$> runBranches both' False branches)
-        <*> (voided <$> runBranches allOf' False branches)
+        <$> (voided <$> runBranches bothOperator False branches)
+        <*> (voided <$> runBranches allOfOperator False branches)
 
-  it "parallel is symmetric except on ties" $ forAllBranches (symmetric parallel')
-  it "both is symmetric except on ties" $ forAllBranches (symmetric both')
+  it "parallel is symmetric except on ties" $ forAllBranches (symmetric parallelOperator)
+  it "both is symmetric except on ties" $ forAllBranches (symmetric bothOperator)
 
   it "parallel has a behaviour that never ends as its identity, except for the result" $
     property $ \a ->

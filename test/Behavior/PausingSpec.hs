@@ -141,8 +141,8 @@ pauses = do
       -- (At different moments: with a tie the schedule decides, and the two have different ones.)
       let times = scanl1 (+) [fromIntegral n | Positive n <- changes]
           seconds base n = base + fromIntegral (n :: Int) / 3
-          happens pausing' = story (zip times (cycle [True, False])) $ \condition record ->
-            pausing'
+          happens pausingBy = story (zip times (cycle [True, False])) $ \condition record ->
+            pausingBy
               condition
               (record "pause" >> sleep (seconds 0.01 pausing) >> record "paused")
               (record "resume" >> sleep (seconds 0.003 resuming) >> record "resumed")
@@ -165,12 +165,12 @@ pauses = do
     it "under random schedules in which it is cancelled as the condition changes" $
       inTurn (randomly 1000) 2 [True, False]
     it "under all schedules of a behaviour that makes the condition true, and ends"
-      . void . explore (exhaustively 1) $ \simulate' -> do
+      . void . explore (exhaustively 1) $ \simulated -> do
         near <- newTVarIO False
         paused <- newTVarIO False
         let become = atomically . writeTVar paused
         let nears = atomically (writeTVar near True)
-        _ <- simulate' (pausedWhile (watchedVar near) (become True >> checkpoint) (become False) nears)
+        _ <- simulated (pausedWhile (watchedVar near) (become True >> checkpoint) (become False) nears)
         readTVarIO paused `shouldReturn` False
 
 failing, faulted :: Ending ()
@@ -195,14 +195,14 @@ stops = do
  where
   stories stopping = do
     found <- newIORef []
-    _ <- explore (exhaustively 1) $ \simulate' -> do
+    _ <- explore (exhaustively 1) $ \simulated -> do
       entries <- newLog
       var <- newTVarIO False
       let changes = for_ [True, False, True, False] (\v -> sleep 1 >> atomically (writeTVar var v))
       let task = (note entries "begin" >> sleep 2) `onException` note entries "stopped"
-      run <- simulate' (both changes (stopping (watchedVar var) task))
-      all' <- notes entries
-      modifyIORef' found ((explain (outcome run), all') :)
+      run <- simulated (both changes (stopping (watchedVar var) task))
+      made <- notes entries
+      modifyIORef' found ((explain (outcome run), made) :)
     readIORef found
 
 -- | What happened, and when, in a simulation with a condition that changes at these times, and is
@@ -219,7 +219,7 @@ story changes act = do
 -- | A driver that is paused and resumed, each in two steps, and a behaviour that ends, or is stopped
 -- after the given time: pausing and resuming never overlap, and at the end the driver is not paused.
 inTurn :: Plan -> Seconds -> [Bool] -> IO ()
-inTurn plan limit changes = void . explore plan $ \simulate' -> do
+inTurn plan limit changes = void . explore plan $ \simulated -> do
   near <- newTVarIO False
   paused <- newTVarIO False
   counter <- newOccupancyCounter
@@ -227,6 +227,6 @@ inTurn plan limit changes = void . explore plan $ \simulate' -> do
       resume = inside counter (sleep 0.25 >> atomically (writeTVar paused False))
       person = for_ changes (\is -> sleep 1 >> atomically (writeTVar near is))
       step = pausedWhile (watchedVar near) pause resume (sleep 2.5)
-  _ <- simulate' (both person (timeout limit (step >> step) ? pure ()))
+  _ <- simulated (both person (timeout limit (step >> step) ? pure ()))
   mostInside counter >>= (`shouldSatisfy` (<= 1))
   readTVarIO paused `shouldReturn` False

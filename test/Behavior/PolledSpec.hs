@@ -52,11 +52,11 @@ laws = do
      in with monitor `sameAs` with (Signal.monitor . Signal.polling 0.01)
 
 -- | Either operator, with a test that is true while the first behaviour may run.
-either' :: [(String, Behavior Bool -> Behavior () -> Behavior () -> Behavior ())]
-either' = [("rSelect", rSelect), ("monitor", \test main other -> monitor (not <$> test) other main)]
+eitherOperator :: [(String, Behavior Bool -> Behavior () -> Behavior () -> Behavior ())]
+eitherOperator = [("rSelect", rSelect), ("monitor", \test main other -> monitor (not <$> test) other main)]
 
 common :: Spec
-common = for_ either' $ \(name, run) -> do
+common = for_ eitherOperator $ \(name, run) -> do
   it (name ++ " reads its test before anything starts") $ do
     entries <- newLog
     entered <- newGate
@@ -80,13 +80,13 @@ common = for_ either' $ \(name, run) -> do
   it (name ++ " never runs both behaviours at the same time, and each time the one that the test selects") $ do
     occupancy <- newOccupancyCounter
     condition <- newTVarIO True
-    running' <- newTVarIO Nothing
-    let branch own = inside occupancy $ atomically (writeTVar running' (Just own)) >> hang
+    runningBranch <- newTVarIO Nothing
+    let branch own = inside occupancy $ atomically (writeTVar runningBranch (Just own)) >> hang
     withThread (run (readTVarIO condition) (branch True) (branch False)) $ \_ ->
       -- 'monitor' does not end its recovery for a test that changes.
       for_ (take (if name == "monitor" then 1 else 10) (cycle [False, True])) $ \holds -> do
         atomically (writeTVar condition holds)
-        atomically (readTVar running' >>= check . (== Just holds))
+        atomically (readTVar runningBranch >>= check . (== Just holds))
     mostInside occupancy `shouldReturn` 1
 
   it (name ++ " keeps the result of a behaviour that completed although its stop was requested") $ do
@@ -120,7 +120,7 @@ common = for_ either' $ \(name, run) -> do
             main = noting >> opened entered >>= \again -> unless again (open entered >> hang)
             other = noting >> open recovered
         masked (run test main other)
-        notes states >>= (`shouldSatisfy` \all' -> length all' > 3 && all (== Unmasked) all')
+        notes states >>= (`shouldSatisfy` \known -> length known > 3 && all (== Unmasked) known)
 
   it (name ++ " is cancelled, and does not fail, under a failingOn for every exception") $ do
     entries <- newLog
@@ -194,18 +194,18 @@ monitoring = do
   it "labels its threads, and starts a new one to read after each recovery" $ do
     recoveries <- newTVarIO (0 :: Int)
     let recovery = atomically (modifyTVar' recoveries (+ 1))
-    all' <- startedBy (monitor ((< 2) <$> readTVarIO recoveries) recovery (pure ()))
+    known <- startedBy (monitor ((< 2) <$> readTVarIO recoveries) recovery (pure ()))
     -- (If the task has not ended as soon as it has begun, the sensor is read on meanwhile.)
-    let (before, after') = splitAt 5 all'
+    let (before, others) = splitAt 5 known
     before `shouldBe` map (Label "monitor") ["polling", "recovery", "polling", "recovery", "polling"]
-    after' `shouldContain` [Label "monitor" "task"]
+    others `shouldContain` [Label "monitor" "task"]
 
 -- | The labels of the threads that an action starts.
 startedBy :: IO a -> IO [Label]
 startedBy act = do
   events <- newLog
   _ <- watchingThreads (note events) act
-  notes events >>= \all' -> pure [label | Started label <- all']
+  notes events >>= \known -> pure [label | Started label <- known]
 
 -- | What an operator is doing.
 data Phase = Phase String (Probe -> Behavior ())
@@ -255,12 +255,12 @@ phases =
 
 cancelled :: Spec
 cancelled =
-  for_ phases $ \(Phase when' act) -> do
-    it ("while " ++ when' ++ ", ends as cancelled when what ran has ended") $ do
+  for_ phases $ \(Phase situation act) -> do
+    it ("while " ++ situation ++ ", ends as cancelled when what ran has ended") $ do
       (end, ran) <- cancelledWhile act Cleanly
       end `shouldBe` CancelledBy (show (Cancel "the caller"))
       length ran `shouldBe` 1
-    it ("while " ++ when' ++ ", ends as cancelled with the fault of what was stopped") $ do
+    it ("while " ++ situation ++ ", ends as cancelled with the fault of what was stopped") $ do
       (end, ran) <- cancelledWhile act Faulting
       end `shouldBe` CancelledWithFault (show (Cancel "the caller")) (show (Fault (concat ran)))
 

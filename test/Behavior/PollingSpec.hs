@@ -60,7 +60,7 @@ slots = do
     level <- timed times (pure . (> 50))
     since <- now
     Signal.waitUntil (Signal.polling 0.001 (sensor level))
-    notes times >>= \all' -> apart 0.001 all' >> noMoreThan 0.001 since all'
+    notes times >>= \known -> apart 0.001 known >> noMoreThan 0.001 since known
 
   it "a reading that is late does not delay the slots after it" $
     for_ [1 .. 5] $ \seed -> do
@@ -77,9 +77,9 @@ slots = do
       when (n == 3) $ eventually ((>= began + 0.01) <$> now)
       pure (n > 20)
     Signal.waitUntil (Signal.polling 0.001 (sensor level))
-    all' <- notes times
-    apart 0.001 all'
-    noMoreThan 0.001 (snd (all' !! 2)) (drop 3 all')
+    known <- notes times
+    apart 0.001 known
+    noMoreThan 0.001 (snd (known !! 2)) (drop 3 known)
 
   it "after a slow reading the next one begins in a slot, and not in between" $ do
     moments <- newLog
@@ -105,14 +105,14 @@ slots = do
     let branch n = unless (n < 0) hang
     since <- now
     Signal.switch (Signal.polling 0.001 (sensor level)) branch
-    notes times >>= \all' -> apart 0.001 all' >> noMoreThan 0.001 since all'
+    notes times >>= \known -> apart 0.001 known >> noMoreThan 0.001 since known
 
   it "readings start a period apart when recovery after recovery takes no time" $ do
     times <- newLog
     level <- timed times (pure . (<= 50))
     since <- now
     Signal.monitor (Signal.polling 0.001 (sensor level)) (pure ()) (pure ())
-    notes times >>= \all' -> apart 0.001 all' >> noMoreThan 0.001 since all'
+    notes times >>= \known -> apart 0.001 known >> noMoreThan 0.001 since known
 
   it "one reading runs at a time" $ do
     occupancy <- newOccupancyCounter

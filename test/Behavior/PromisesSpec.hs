@@ -231,27 +231,27 @@ nested = do
     level (\_ _ caller -> caller) `shouldReturn` (Gave isCancelled, ["cleaned up"])
 
   inEach places "are all stopped, in any order of nesting, when the outermost is cancelled" $ \place ->
-    forM_ places $ \place' -> do
+    forM_ places $ \other -> do
       entries <- newLog
       inside <- newGate
-      let act = (open inside >> hang) `onException` note entries (show place')
-      end <- cancelling (leavingNothing (placed place (placed place' act))) (pass inside)
+      let act = (open inside >> hang) `onException` note entries (show other)
+      end <- cancelling (leavingNothing (placed place (placed other act))) (pass inside)
       done <- notes entries
-      (end, done) `shouldBe` (isCancelled, [show place'])
+      (end, done) `shouldBe` (isCancelled, [show other])
 
   inEach places "are all stopped through threads of async's, and handlers that rethrow" $ \place ->
-    forM_ places $ \place' -> do
+    forM_ places $ \other -> do
       entries <- newLog
       inside <- newGate
-      let act = (open inside >> hang) `onException` note entries (show place')
+      let act = (open inside >> hang) `onException` note entries (show other)
           between inner = race_ (inner `catch` \(e :: SomeException) -> throwIO e) hang
-      end <- cancelling (leavingNothing (placed place (between (placed place' act)))) (pass inside)
+      end <- cancelling (leavingNothing (placed place (between (placed other act)))) (pass inside)
       done <- notes entries
-      (end, done) `shouldBe` (isCancelled, [show place'])
+      (end, done) `shouldBe` (isCancelled, [show other])
 
   inEach threaded "rethrow a fault from any depth while they are stopped" $ \place ->
-    forM_ threaded $ \place' -> do
+    forM_ threaded $ \other -> do
       inside <- newGate
-      let act = placed place (placed place' ((open inside >> hang) `onException` throwIO (Fault (show place'))))
+      let act = placed place (placed other ((open inside >> hang) `onException` throwIO (Fault (show other))))
       cancelling act (pass inside)
-        `shouldReturn` CancelledWithFault (show theCancel) (show (Fault (show place')))
+        `shouldReturn` CancelledWithFault (show theCancel) (show (Fault (show other)))

@@ -91,16 +91,16 @@ olderThan = do
 
   it "judges a time that is earlier than the one before at once" $ do
     stamp <- newTVarIO 0
-    let script' = sleep 1 >> atomically (writeTVar stamp (-9))
-    run <- simulate (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (script' >> hang))
+    let changing = sleep 1 >> atomically (writeTVar stamp (-9))
+    run <- simulate (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (changing >> hang))
     finished run `shouldBe` 1
 
   it "faults as soon as the time is NaN" $ do
     stamp <- newTVarIO 0
     end <- newIORef Nothing
-    let script' = sleep 1 >> atomically (writeTVar stamp (0 / 0))
+    let changing = sleep 1 >> atomically (writeTVar stamp (0 / 0))
     run <- simulate $
-      ending (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (script' >> hang))
+      ending (Signal.waitUntil (Signal.olderThan 5 (watchedVar stamp)) ||| (changing >> hang))
         >>= writeIORef end . Just
     finished run `shouldBe` 1
     readIORef end `shouldReturn` Just (FaultedWith "olderThan: a point in time is a number, not NaN")
@@ -129,13 +129,13 @@ olderThan = do
 missing :: (Signal Char -> Signal Bool -> Signal Bool) -> IO Bool
 missing signal = do
   missed <- newIORef False
-  _ <- explore (randomly 100) $ \simulate' -> do
+  _ <- explore (randomly 100) $ \simulated -> do
     place <- newTVarIO 'a'
     fresh <- newTVarIO False
     let driver =
           sleep 1 >> atomically (writeTVar place 'b' >> writeTVar fresh True) >> atomically (writeTVar fresh False)
         robot = Signal.waitUntil (signal (watchedVar place) (watchedVar fresh))
-    run <- simulate' (robot ||| (driver >> sleep 9))
+    run <- simulated (robot ||| (driver >> sleep 9))
     when (finished run > 1) (writeIORef missed True)
   readIORef missed
 
@@ -199,9 +199,9 @@ observed :: Eq b => (Signal a -> Signal b) -> Timed a -> IO (Timed b)
 observed filtering steps = do
   seen <- newLog
   level <- newTVarIO (snd (head steps))
-  let play' = for_ (drop 1 steps) $ \(t, value) -> sleepUntil t >> atomically (writeTVar level value)
+  let playing = for_ (drop 1 steps) $ \(t, value) -> sleepUntil t >> atomically (writeTVar level value)
       record value = now >>= \t -> note seen (t, value) >> hang
-  _ <- simulate (Signal.switch (filtering (watchedVar level)) record ||| (play' >> sleep 30))
+  _ <- simulate (Signal.switch (filtering (watchedVar level)) record ||| (playing >> sleep 30))
   notes seen
 
 -- | What 'Signal.throttle' should give.
@@ -209,10 +209,10 @@ throttled :: Seconds -> Timed Int -> Timed Int
 throttled seconds = \case
   [] -> []
   (t, value) : later ->
-    let until' = t + seconds
-        (meanwhile, after) = span ((<= until') . fst) later
+    let restsUntil = t + seconds
+        (meanwhile, after) = span ((<= restsUntil) . fst) later
         latest = last (value : map snd meanwhile)
-        others = if latest /= value then (until', latest) : after else dropWhile ((== value) . snd) after
+        others = if latest /= value then (restsUntil, latest) : after else dropWhile ((== value) . snd) after
      in (t, value) : throttled seconds others
 
 -- | What 'Signal.changes' should give.

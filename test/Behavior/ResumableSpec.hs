@@ -148,14 +148,14 @@ spec = guarded $ do
 visitedTwice :: Plan -> (TVar [Int] -> (Int -> Behavior ()) -> Behavior ()) -> IO Bool
 visitedTwice plan resuming = do
   found <- newIORef False
-  _ <- explore plan $ \simulate' -> do
+  _ <- explore plan $ \simulated -> do
     left <- newTVarIO [1, 2, 3]
     low <- newTVarIO False
     visited <- newIORef []
     let visit n = sleep 1 >> modifyIORef' visited (n :)
         recharge = atomically (writeTVar low False)
         drains = for_ [2, 4 :: Seconds] $ \_ -> sleep 2 >> atomically (writeTVar low True)
-    _ <- simulate' (Signal.monitor (Signal.watching (readTVar low)) recharge (resuming left visit) ||| (drains >> hang))
+    _ <- simulated (Signal.monitor (Signal.watching (readTVar low)) recharge (resuming left visit) ||| (drains >> hang))
     places <- readIORef visited
     when (length places > length (nub places)) $ writeIORef found True
   readIORef found
@@ -165,7 +165,7 @@ visitedTwice plan resuming = do
 repeatedStep :: Plan -> (TVar (Map Int String) -> Int -> (Char -> Behavior ()) -> Behavior (STM ())) -> IO Bool
 repeatedStep plan carryingOut = do
   found <- newIORef False
-  _ <- explore plan $ \simulate' -> do
+  _ <- explore plan $ \simulated -> do
     progress <- newTVarIO Map.empty
     low <- newTVarIO False
     jammed <- newTVarIO True
@@ -181,7 +181,7 @@ repeatedStep plan carryingOut = do
         allOrders inbox =
           atomically (unhandled inbox) >>= \n -> if n == 0 then pure () else order inbox >> allOrders inbox
         robot = withInbox 5 orders (Signal.monitor (Signal.watching (readTVar low)) recharge . allOrders)
-    _ <- simulate' (robot ||| (drains >> hang))
+    _ <- simulated (robot ||| (drains >> hang))
     steps <- readIORef done
     when (length steps > length (nub steps)) $ writeIORef found True
   readIORef found
@@ -189,5 +189,5 @@ repeatedStep plan carryingOut = do
 -- | The mistake that 'resumable' does not make.
 storedLater :: TVar [a] -> (a -> Behavior ()) -> Behavior ()
 storedLater left act = do
-  now' <- readTVarIO left
-  for_ now' $ \x -> act x >> atomically (modifyTVar' left (drop 1))
+  remaining <- readTVarIO left
+  for_ remaining $ \x -> act x >> atomically (modifyTVar' left (drop 1))

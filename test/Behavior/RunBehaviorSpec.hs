@@ -124,12 +124,12 @@ spec = guarded . describe "runBehavior" $ do
         began <- newGate
         mayEnd <- newGate
         inside <- newGate
-        withThread (runBehavior (open began >> pass mayEnd)) $ \before' -> do
+        withThread (runBehavior (open began >> pass mayEnd)) $ \earlier -> do
           pass began
           withThread (runBehavior (open inside >> hang)) $ \caller -> do
             pass inside
             open mayEnd
-            wait before'
+            wait earlier
             runBehavior (pure ())
             raiseSignal signal
             (wait caller :: IO ()) `shouldThrow` (== ExitFailure code)

@@ -64,21 +64,21 @@ starting = do
       self `shouldNotBe` caller
 
   it "counts the thread as live until it has ended, and no longer" $ do
-    before' <- liveThreadCount
+    threadsBefore <- liveThreadCount
     gate <- newGate
     thread <- mask_ (start label (pass gate))
-    liveThreadCount `shouldReturn` before' + 1
+    liveThreadCount `shouldReturn` threadsBefore + 1
     open gate
     _ <- atomically (threadEnd thread)
-    liveThreadCount `shouldReturn` before'
+    liveThreadCount `shouldReturn` threadsBefore
 
   it "no longer counts the thread when it publishes how it ended" $ do
-    before' <- liveThreadCount
+    threadsBefore <- liveThreadCount
     counted <- newTVarIO (-1)
     let count _ = unsafeIOToSTM liveThreadCount >>= writeTVar counted
     thread <- mask_ (startWith Inherited pure count label (pure ()))
     _ <- atomically (threadEnd thread)
-    readTVarIO counted `shouldReturn` before'
+    readTVarIO counted `shouldReturn` threadsBefore
 
   it "publishes how the thread ended by the transaction that is part of that" $ do
     gate <- newGate
@@ -374,7 +374,7 @@ scopes = do
       finished run `shouldBe` 1
 
   it "can be interrupted by a cleanup also after GHC has taken the caller for deadlocked" $ do
-    gates@[inside, inside', mayEnd, mayThrow] <- replicateM 4 newGate
+    gates@[inside, deeper, mayEnd, mayThrow] <- replicateM 4 newGate
     cleaning <- newGate
     caller <- newEmptyMVar
     let operator = inScope $ \scope -> do
@@ -384,7 +384,7 @@ scopes = do
               :: IO (Branch ())
           _ <-
             branch scope "second" $
-              uninterruptibly (open inside' >> hang) (pass mayThrow >> readMVar caller >>= (`throwTo` Cancel "cleanup"))
+              uninterruptibly (open deeper >> hang) (pass mayThrow >> readMVar caller >>= (`throwTo` Cancel "cleanup"))
               :: IO (Branch ())
           traverse_ pass (take 2 gates)
           pure (pure ())
@@ -394,12 +394,12 @@ scopes = do
       openAll [mayEnd, mayThrow]
       awaitEnd thread `shouldReturn` CancelledBy (show (Cancel "cleanup"))
 
-  for_ [("interrupts", 1), ("recovers first", 0)] $ \(manner, start') ->
+  for_ [("interrupts", 1), ("recovers first", 0)] $ \(manner, moment) ->
     it ("stops all threads of a monitor that " ++ manner ++ " and is cancelled while it makes its stop requests") $
       void . explore (randomly 1000) $ \simulated -> do
-        let due = Signal.polling 1 ((>= start') <$> now)
-        run <- simulated (parallel (Signal.monitor ((&&) <$> due <*> due) (pure ()) hang) (sleep start'))
-        finished run `shouldBe` start'
+        let due = Signal.polling 1 ((>= moment) <$> now)
+        run <- simulated (parallel (Signal.monitor ((&&) <$> due <*> due) (pure ()) hang) (sleep moment))
+        finished run `shouldBe` moment
  where
   -- An operator with this verdict.
   inScope body = structured "operator" (fmap (Verdict cause) . body)

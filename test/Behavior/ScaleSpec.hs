@@ -59,7 +59,7 @@ children = do
 -- (More of them work more than in proportion: docs/signals.md.)
 filters :: Spec
 filters =
-  for_ all' $ \(name, filtering) ->
+  for_ everyFilter $ \(name, filtering) ->
     it name $
       (1, 8) `takesAtMost` 8 $ \depth -> allocatedBy $ do
         level <- newTVarIO (0 :: Int)
@@ -71,7 +71,7 @@ filters =
           (\_ -> atomically (modifyTVar' seen (+ 1)) >> hang)
           ||| for_ [0 .. 200] change
  where
-  all' =
+  everyFilter =
     [ ("debounce", Signal.debounce 0)
     , ("throttle", Signal.throttle 0)
     , ("hysteresis", fmap fromEnum . Signal.hysteresis False 0 1)
@@ -92,8 +92,8 @@ takesAtMost (few, many) times work = do
 -- share depends on what else the machine does.
 processorTime :: IO a -> IO Int64
 processorTime act = do
-  before' <- used
+  usedBefore <- used
   _ <- act
-  subtract before' <$> used
+  subtract usedBefore <$> used
  where
   used = performMajorGC >> mutator_cpu_ns <$> getRTSStats

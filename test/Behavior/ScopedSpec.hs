@@ -44,9 +44,9 @@ spec = guarded $ do
 
   it "has started what was forked when fork returns" $
     scoped $ \nursery -> do
-      before' <- liveThreadCount
+      threadsBefore <- liveThreadCount
       _ <- fork nursery hang :: IO (Child ())
-      liveThreadCount `shouldReturn` before' + 1
+      liveThreadCount `shouldReturn` threadsBefore + 1
 
   it "lets a forked behaviour fork others, and all end together" $ do
     (end, done) <- observing $ \entries -> do
@@ -79,13 +79,13 @@ spec = guarded $ do
 
   it "prefers the fault of the scoped behaviour to those of forked ones, \
      \and that of an earlier fork to a later one's" $ do
-    let faulty gate name' = (open gate >> hang) `onException` throwIO (Fault name') :: IO ()
+    let faulty gate which = (open gate >> hang) `onException` throwIO (Fault which) :: IO ()
         faults theirs own = do
           inside <- newGate
           ending . scoped $ \nursery -> do
-            for_ theirs $ \name' -> do
+            for_ theirs $ \which -> do
               gate <- newGate
-              _ <- fork nursery (faulty gate name')
+              _ <- fork nursery (faulty gate which)
               pass gate
             open inside
             pure () `finally` own
@@ -93,11 +93,11 @@ spec = guarded $ do
     faults ["first", "second"] (throwIO (Fault "scoped")) `shouldReturn` FaultedWith (show (Fault "scoped"))
 
   it "prefers the fault of an earlier fork also when children that have ended were forgotten meanwhile" $ do
-    let faulty gate name' = (open gate >> hang) `onException` throwIO (Fault name') :: IO ()
+    let faulty gate which = (open gate >> hang) `onException` throwIO (Fault which) :: IO ()
     end <- ending . scoped $ \nursery -> do
-      for_ ["first", "second"] $ \name' -> do
+      for_ ["first", "second"] $ \which -> do
         gate <- newGate
-        _ <- fork nursery (faulty gate name')
+        _ <- fork nursery (faulty gate which)
         pass gate
       replicateM_ 14 (fork nursery (pure ()) >>= atomically . await)
     end `shouldBe` FaultedWith (show (Fault "first"))
@@ -120,15 +120,15 @@ spec = guarded $ do
   it "fails to fork while all is being stopped, in a cleanup of the scoped behaviour or of a child, \
      \and nothing runs" $ do
     inside <- newGate
-    inside' <- newGate
+    insideOther <- newGate
     let forking entries nursery = ending (void (fork nursery (note entries "forked"))) >>= note entries . show
     (end, done) <- observing $ \entries ->
       scoped
         ( \nursery -> do
-            _ <- fork nursery ((open inside' >> hang) `onException` forking entries nursery) :: IO (Child ())
+            _ <- fork nursery ((open insideOther >> hang) `onException` forking entries nursery) :: IO (Child ())
             (open inside >> hang) `onException` forking entries nursery
         )
-        ||| (pass inside >> pass inside')
+        ||| (pass inside >> pass insideOther)
     let tooLate = FailedWith (show (FailedBecause "fork: the nursery's scoped behaviour is ending")) :: Ending ()
     (end, done) `shouldBe` (Gave (), [show tooLate, show tooLate])
 
@@ -147,14 +147,14 @@ spec = guarded $ do
       end `shouldBe` Gave ()
 
   it "fails to fork only what has not run, whenever the scope is stopped" $
-    void . explore (randomly 1000) $ \simulate' -> do
+    void . explore (randomly 1000) $ \simulated -> do
       entries <- newLog
       let body nursery = void (fork nursery (note entries "ran")) `catch` \(_ :: Failed) -> note entries "failed"
-      _ <- simulate' (scoped body ||| pure ())
+      _ <- simulated (scoped body ||| pure ())
       notes entries >>= (`shouldSatisfy` (< 2) . length)
 
   it "loses no fault of a child, also when it is stopped just as it forgets the children that have ended" $
-    void . explore (randomly 300) $ \simulate' -> do
+    void . explore (randomly 300) $ \simulated -> do
       faults <- newTVarIO False
       let faulty = atomically (writeTVar faults True) >> throwIO (Fault "child")
           body nursery =
@@ -162,7 +162,7 @@ spec = guarded $ do
               >> void (fork nursery faulty :: IO (Child ()))
               >> fork nursery (pure ())
               >> hang
-      run <- simulate' (scoped body ||| atomically (readTVar faults >>= check))
+      run <- simulated (scoped body ||| atomically (readTVar faults >>= check))
       endOf (outcome run) `shouldBe` FaultedWith (show (Fault "child"))
 
   describe "what fork returns" children
@@ -208,12 +208,12 @@ children = do
     (end, done) <- observing $ \entries ->
       scoped $ \nursery -> do
         inside <- newGate
-        inside' <- newGate
+        insideOther <- newGate
         one <- fork nursery ((open inside >> hang) `onException` note entries "its cleanup") :: IO (Child ())
         _ <- fork nursery $
-          (open inside' >> hang) `onException` (ending (atomically (await one)) >>= note entries . show)
+          (open insideOther >> hang) `onException` (ending (atomically (await one)) >>= note entries . show)
         pass inside
-        pass inside'
+        pass insideOther
     (end, done) `shouldBe` (Gave (), ["its cleanup", show (stopped :: Ending ())])
 
   it "stops a child when that is requested; the scoped behaviour continues" $ do

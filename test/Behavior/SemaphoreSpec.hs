@@ -91,9 +91,9 @@ noted semaphore act = do
 lostUnit :: (TSem -> Behavior () -> Behavior ()) -> IO Bool
 lostUnit holding = do
   found <- newIORef False
-  _ <- explore (exhaustively 1) $ \simulate' -> do
+  _ <- explore (exhaustively 1) $ \simulated -> do
     semaphore <- atomically (newTSem 0)
-    _ <- simulate' (holding semaphore (sleep 1) ||| (atomically (signalTSem semaphore) >> checkpoint))
+    _ <- simulated (holding semaphore (sleep 1) ||| (atomically (signalTSem semaphore) >> checkpoint))
     free <- isFree semaphore
     unless free (writeIORef found True)
   readIORef found
@@ -104,7 +104,7 @@ isFree semaphore = atomically ((True <$ waitTSem semaphore) `orElse` pure False)
 
 -- | Behaviours share units. One fails; one is stopped, wherever it is; one is slow to stop.
 held :: Plan -> Int -> (forall a. [a] -> [a]) -> IO ()
-held plan units some = void . explore plan $ \simulate' -> do
+held plan units some = void . explore plan $ \simulated -> do
   semaphore <- atomically (newTSem (toInteger units))
   free <- newIORef False
   counter <- newOccupancyCounter
@@ -114,7 +114,7 @@ held plan units some = void . explore plan $ \simulate' -> do
         , (using (sleep 1) ||| sleep 1) >> hang
         , using (sleep 3) `onException` uninterruptibleMask_ (sleep 1)
         ]
-  _ <- simulate' $ do
+  _ <- simulated $ do
     firstOf (some robots) ||| sleep 2
     replicateM_ units (atomically (waitTSem semaphore))
     writeIORef free True

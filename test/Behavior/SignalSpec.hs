@@ -97,7 +97,7 @@ started :: IO a -> IO [Label]
 started act = do
   events <- newLog
   _ <- watchingThreads (note events) act
-  notes events >>= \all' -> pure [label | Started label <- all']
+  notes events >>= \known -> pure [label | Started label <- known]
 
 sharing :: Spec
 sharing = do
@@ -182,9 +182,9 @@ sharing = do
     atomically (takeTMVar leaked) >>= ending . Signal.waitUntil >>= (`shouldBe` closed)
 
   it "is closed also if it is stopped before its sensors have started" $
-    void . explore (randomly 300) $ \simulate' -> do
+    void . explore (randomly 300) $ \simulated -> do
       leaked <- newEmptyTMVarIO
-      run <- simulate' $ do
+      run <- simulated $ do
         Signal.withShared (Signal.polling 1 (pure True)) (\s -> atomically (putTMVar leaked s) >> hang)
           ||| void (atomically (readTMVar leaked))
         atomically (takeTMVar leaked) >>= ending . Signal.waitUntil

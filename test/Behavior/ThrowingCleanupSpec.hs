@@ -79,11 +79,11 @@ fromCleanups = do
       occupancy <- newTVarIO (0 :: Int)
       end <- withThread (do
         me <- myThreadId
-        let throwing' target e = void (forkIO (throwTo target (Fault e)))
+        let throwAside target e = void (forkIO (throwTo target (Fault e)))
             one n cleanup = counted occupancy (branch (gates !! n) cleanup)
             nested n m = do
               self <- myThreadId
-              parallel (one n (throwing' self "inner")) (one m (throwing' me "outer"))
+              parallel (one n (throwAside self "inner")) (one m (throwAside me "outer"))
         parallel (for_ gates pass) (both (nested 0 1) (nested 2 3))) awaitEnd
       end `shouldSatisfy` \case
         Gave () -> True
@@ -182,11 +182,11 @@ limited (Limit trigger (set, box)) act = do
         atomically (writeTVar own (Just thrower))
         note box thrower
         thrower <$ open set
-  handleJust'
+  handleOwn
     own
     (bracket start (uninterruptibleMask_ . killThread) (const (Just <$> act)))
  where
-  handleJust' own body =
+  handleOwn own body =
     body `catch` \(Expired thrower) ->
       readTVarIO own >>= \mine -> if mine == Just thrower then pure Nothing else throwIO (Expired thrower)
 

@@ -228,12 +228,12 @@ deadlines = do
       events <- newLog
       let record what = now >>= \t -> note events (what, t)
           charge = record "charge" >> sleep 10 >> atomically (writeTVar low False)
-          try' = record "try" >> sleep 100
+          oneTry = record "try" >> sleep 100
           drains = for_ [7, 40] (\t -> sleepUntil t >> atomically (writeTVar low True)) >> sleepForever
           mission = do
             end <- (+ 60) <$> now
             Signal.monitor (Signal.watching (readTVar low)) charge
-              (timeoutAt end (retrying (iterate (* 2) 1) (timeout 5 try')))
+              (timeoutAt end (retrying (iterate (* 2) 1) (timeout 5 oneTry)))
       _ <- simulated ((drains ||| mission) `fallbackWith` (record . show))
       -- 5 s for each try, pauses of 1, 2, 4 and 8 s; after each charging from the beginning.
       notes events

@@ -25,8 +25,8 @@ spec = guarded $ do
   it "hands over each order once, and frees each charger, on its worst day" $
     survives 300 (day worst "returned" once fleet)
   it "fails when no robot is left, and keeps the orders" $
-    let day' = day [quiet "Bo" [5], quiet "Ed" [5]] "failure: FailedBecause \"no robot is left\""
-     in survives 100 (day' (never (successOf "hand over")) fleet)
+    let noneLeft = day [quiet "Bo" [5], quiet "Ed" [5]] "failure: FailedBecause \"no robot is left\""
+     in survives 100 (noneLeft (never (successOf "hand over")) fleet)
   it "and robots that take an order and then protect it lose one" $
     failsWith "It was so 0 times" 200 (day worst "returned" once (each takeThenProtect))
   it "and robots that can be interrupted as they hand over an order do it twice" $

@@ -40,9 +40,9 @@ env = Mission . asks
 spec :: Spec
 spec = guarded $ do
   it "an operator stops and restarts behaviours of that monad, and never runs two, under all schedules" $
-    void . explore (exhaustively 1) $ \simulate' -> do
+    void . explore (exhaustively 1) $ \simulated -> do
       rover <- Rover <$> newTVarIO False <*> newTVarIO 0 <*> newTVarIO []
-      _ <- simulate' (runMission mission rover)
+      _ <- simulated (runMission mission rover)
       readTVarIO (running rover) `shouldReturn` 0
       reverse <$> readTVarIO (record rover) `shouldReturn` ["drive", "recharge", "drive"]
 

@@ -115,7 +115,7 @@ targets =
       t <- thread "target" $ do
         record
         mask_ (record >> interruptible record >> uninterruptibleMask_ (record >> interruptible record) >> record)
-        mask (\restore -> restore record >> mask (\restore' -> restore' record))
+        mask (\restore -> restore record >> mask (\restoreInner -> restoreInner record))
         uninterruptibleMask (\restore -> mask_ record >> restore record)
         throwIO (Fault "x") `catch` \(Fault _) -> record
         uninterruptibleMask_ (throwIO (Fault "x") `catch` \(Fault _) -> record)

@@ -103,7 +103,7 @@ realOutcomes :: Ord a => Int -> IO a -> IO (Set a)
 realOutcomes n program = go n Set.empty
  where
   go 0 seen = pure seen
-  go k seen = program >>= \a -> let seen' = Set.insert a seen in seen' `seq` go (k - 1) seen'
+  go k seen = program >>= \a -> let more = Set.insert a seen in more `seq` go (k - 1) more
 
 -- | The outcomes of all schedules with up to the given number of pre-emptions.
 simulatedOutcomes :: Int -> IO String -> IO (Set String)

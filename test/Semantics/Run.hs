@@ -100,11 +100,11 @@ plain =
 allObserved :: Int -> Int -> World -> IO (Set (Either String Seen), Bool)
 allObserved preemptions most world = do
   found <- newIORef Set.empty
-  let all' = (exhaustively preemptions) {planSearch = Exhaustive preemptions most, planOptions = limits world}
-  report <- explore all' $ \simulated ->
+  let plan = (exhaustively preemptions) {planSearch = Exhaustive preemptions most, planOptions = limits world}
+  report <- explore plan $ \simulated ->
     observing plain simulated world >>= \(seen, _) -> modifyIORef' found (Set.insert seen)
-  found' <- readIORef found
-  pure (found', reportComplete report)
+  everySeen <- readIORef found
+  pure (everySeen, reportComplete report)
 
 -- | A run without an end is cut short.
 limits :: World -> SimOptions
@@ -161,10 +161,10 @@ behavior instrument emit world = withMessages $ \delivers whole -> do
   case caller world of
     Operator -> aroundPart instrument (root instrument) (FirstOf [program world]) $ \_ within ->
       firstOf [running (branchOf instrument "firstOf: 1" within), timeIsUp <$ environment context]
-    PlainThread type' later -> do
+    PlainThread exceptionKind later -> do
       thread <-
         mask_ (start (Label "plain thread" "") (running (branchOf instrument "plain thread" (root instrument))))
-      let interrupting = case type' of
+      let interrupting = case exceptionKind of
             Asynchronous -> throwToAll (const Enough) [threadId thread]
             Synchronous -> throwToAll (const EnoughOfThis) [threadId thread]
       environment context

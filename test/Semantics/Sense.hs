@@ -73,10 +73,10 @@ pollerSteps steps receive t s =
       BetweenSlots due
         | clock t >= due ->
             silently t $
-              read'
+              afterPart
                 s {slot = clock t + period s, readings = readings s + 1, inFlightSince = Just (clock t)}
                 (begin t (sensor s))
-      Reading r -> [(l, t', read' s r') | (l, t', r') <- steps t r]
+      Reading r -> [(l, t', afterPart s r') | (l, t', r') <- steps t r]
       Unpublished result ->
         silently t $
           s {newest = Just (readings s, result), inFlightSince = Nothing, poll = BetweenSlots (nextSlot (slot s))}
@@ -84,14 +84,14 @@ pollerSteps steps receive t s =
       _ -> []
       ++ [(Emits transition, t, s') | pollerRequest s == Requested, (transition, s') <- receives]
  where
-  read' p = \case
+  afterPart p = \case
     Over result
       -- The reading is not needed any more, but its failure or fault is kept.
       | pollerRequest p /= NoRequest -> p {poll = EndingWith result}
       | otherwise -> p {poll = Unpublished result}
     r -> p {poll = Reading r}
   receives = case poll s of
-    Reading r -> fmap (read' afterReceiving) <$> receive t r
+    Reading r -> fmap (afterPart afterReceiving) <$> receive t r
     EndingWith _ -> []
     PollEnded _ -> []
     _ -> [(Silent, afterReceiving {poll = PollEnded (Stopped Nothing)})]
@@ -119,19 +119,19 @@ hysteresisSteps t m source =
 debounceSteps :: Now -> Debouncer -> Source -> Steps Source
 debounceSteps t d source =
   (if request worker == Received then [] else tracks)
-    ++ (if timer d == Received then [] else silently' times)
-    ++ silently' [d {changeWorker = worker {request = Received}} | request worker == Requested]
-    ++ silently' [d {timer = Received} | timer d == Requested]
+    ++ (if timer d == Received then [] else allSilently times)
+    ++ allSilently [d {changeWorker = worker {request = Received}} | request worker == Requested]
+    ++ allSilently [d {timer = Received} | timer d == Requested]
  where
   worker = changeWorker d
-  silently' ds = [(Emits Silent, t, Debounced d' source) | d' <- ds]
+  allSilently ds = [(Emits Silent, t, Debounced d' source) | d' <- ds]
   tracks = case changeTracking d of
     Tracked old -> case readSource t FirstRead (view worker) source of
       Just (Right (value, t', source'))
         | Just value /= old -> silently t' (Debounced d {changeTracking = Observed old value} source')
       _ -> []
     Observed old value ->
-      silently' [(if isNothing old then counts value else waits value) {changeTracking = Tracked (Just value)}]
+      allSilently [(if isNothing old then counts value else waits value) {changeTracking = Tracked (Just value)}]
   counts value = d {settled = Just value}
   waits value = d {pending = if settled d == Just value then Nothing else Just (value, clock t)}
   times = case timedChange d of

@@ -197,22 +197,22 @@ oldestReading t = \case
 -- | Requests the stop of all threads of a source.
 requestStopOfSource :: Source -> Source
 requestStopOfSource = \case
-  Polling s -> Polling s {pollerRequest = requestStop' (pollerRequest s)}
+  Polling s -> Polling s {pollerRequest = withStop (pollerRequest s)}
   Joined how sources -> Joined how (map requestStopOfSource sources)
   WithHysteresis m source ->
     WithHysteresis m {hysteresisWorker = requestStopOfWorker (hysteresisWorker m)} (requestStopOfSource source)
   Debounced d source ->
     Debounced
-      d {changeWorker = requestStopOfWorker (changeWorker d), timer = requestStop' (timer d)}
+      d {changeWorker = requestStopOfWorker (changeWorker d), timer = withStop (timer d)}
       (requestStopOfSource source)
   Throttled h source ->
     Throttled h {throttleWorker = requestStopOfWorker (throttleWorker h)} (requestStopOfSource source)
   WithWatchdog w source ->
-    WithWatchdog w {watchdogRequest = requestStop' (watchdogRequest w)} (requestStopOfSource source)
+    WithWatchdog w {watchdogRequest = withStop (watchdogRequest w)} (requestStopOfSource source)
   other -> other
  where
-  requestStopOfWorker w = w {request = requestStop' (request w)}
-  requestStop' = \case
+  requestStopOfWorker w = w {request = withStop (request w)}
+  withStop = \case
     NoRequest -> Requested
     other -> other
 

@@ -151,7 +151,7 @@ steps t = \case
   Changing [] end -> if clock t >= end then silently t (Over (Succeeded timeIsUp)) else []
   Called _ (Over result) [] [] -> silently t (Over result)
   Called requests r coming stopTimes ->
-    [(l, t', Called requests' (returning r r') coming stopTimes) | (l, t', requests', r') <- running' t requests r]
+    [(l, t', Called requests' (returning r r') coming stopTimes) | (l, t', requests', r') <- runningSteps t requests r]
       ++ case (coming, stopTimes) of
         (Change at condition level : others, _) -> changing at condition level (Called requests r others stopTimes)
         ([], at : others) | clock t >= at -> silently t (Called (requestedAgain requests) r [] others)
@@ -245,8 +245,8 @@ isPending :: Request -> Bool
 isPending = (`elem` [Pending, PendingTwice, PendingAndRequested])
 
 -- | The steps of what runs in a thread, with the requests that are left after each.
-running' :: Now -> Request -> Running -> [(Effect, Now, Request, Running)]
-running' t requests r
+runningSteps :: Now -> Request -> Running -> [(Effect, Now, Request, Running)]
+runningSteps t requests r
   | isPending requests, not (null received) = received
   | otherwise = [(l, t', startedRequest, r') | (l, t', r') <- steps t r] ++ received
  where
@@ -277,8 +277,8 @@ receive t = \case
     | otherwise -> []
   first `AndThen` second -> fmap (\r -> andThen t r second) <$> receive t first
   first `OrElse` second -> fmap (\r -> orElse t r second) <$> receive t first
-  StoppingChild k r -> within' (StoppingChild k) r
-  AwaitingChild k r -> within' (AwaitingChild k) r
+  StoppingChild k r -> childStopping (StoppingChild k) r
+  AwaitingChild k r -> childStopping (AwaitingChild k) r
   AsChild k r -> fmap (AsChild k) <$> receive t r
   Sleeping _ -> stopped
   InSlot interval from p r -> fmap (inSlot t interval from p) <$> receive t r
@@ -312,7 +312,7 @@ receive t = \case
   Over _ -> []
  where
   stopped = [(Silent, Over (Stopped Nothing))]
-  within' around = \case
+  childStopping around = \case
     Over _ -> stopped
     r -> fmap (whenSuccessful around) <$> receive t r
   respond name = \case
@@ -332,7 +332,7 @@ threadSteps t (Thread label state) = case state of
   -- The work is done, and a stop request can still arrive.
   Live requests (Returning result) -> returning Finished requests result
   Live requests (AsChild k (Returning result)) -> returning (FinishedChild k) requests result
-  Live requests r -> [(l, t', becomes requests' r') | (l, t', requests', r') <- running' t requests r]
+  Live requests r -> [(l, t', becomes requests' r') | (l, t', requests', r') <- runningSteps t requests r]
   Finished result -> [publishes t result]
   FinishedChild k result ->
     [publishes t {childResults = Map.insert k (Just (answer (asOutcome result))) (childResults t)} result]
@@ -399,7 +399,7 @@ reactions t p source v phase = case phase of
       Idle -> id
       _ -> requestStopOfSource
   afterStop next result branch = case (next, result) of
-    (Conclude result', Stopped _) -> conclude React result' source []
+    (Conclude concluded, Stopped _) -> conclude React concluded source []
     (Conclude _, _) -> conclude React result source [branch]
     (RunToEnd _, Succeeded _) -> conclude React result source []
     (RunToEnd recovery, Stopped _) -> recover Nothing source recovery

@@ -96,8 +96,8 @@ names = do
     for_ unknown $ \claim -> verdict claim world `refusedAs` "Nothing in this world is called"
 
   it "are those of what can do this" $
-    for_ neverSo $ \(claim, words', why) ->
-      wrong (verdict claim world) `shouldBe` [words' ++ ".", why]
+    for_ neverSo $ \(claim, claimText, why) ->
+      wrong (verdict claim world) `shouldBe` [claimText ++ ".", why]
 
   it "are those of what can do this, if there is anything" $
     wrong (verdict (never (becoming "drive" True)) (recordOf [("drive", AnAction)] []))

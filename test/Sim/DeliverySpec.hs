@@ -249,8 +249,8 @@ throwers = do
 endOfBranch :: Spec
 endOfBranch = do
   it "is recorded with its start and its end, also if it is stopped before it begins" $
-    void . explore (exhaustively 1) $ \simulate' -> do
-      run <- simulate' (parallel (pure ()) (pure ()))
+    void . explore (exhaustively 1) $ \simulated -> do
+      run <- simulated (parallel (pure ()) (pure ()))
       [stepKind s | s <- steps run, stepLabel s == Label "parallel" "right", stepKind s `elem` [Starts, Ends]]
         `shouldBe` [Starts, Ends]
   it "can be stopped after its last operation" $ do
@@ -261,14 +261,14 @@ endOfBranch = do
       either (show :: SomeException -> String) (\() -> "returned") <$> atomically (threadEnd target)
     ends `shouldMatchList` [show "returned", show (show (Cancel "a"))]
   it "without operations can be stopped, too" $ do
-    did' <- newIORef (0 :: Int)
+    count <- newIORef (0 :: Int)
     ends <- everyEnd $ do
-      target <- mask_ (start (Label "target" "") (modifyIORef did' (+ 1)))
+      target <- mask_ (start (Label "target" "") (modifyIORef count (+ 1)))
       throwToAll (const (Cancel "a")) [threadId target]
-      earlier <- readIORef did'
+      earlier <- readIORef count
       end <- atomically (threadEnd target)
-      at' <- readIORef did'
-      pure (at' > earlier, either (show :: SomeException -> String) (\() -> "returned") end)
+      later <- readIORef count
+      pure (later > earlier, either (show :: SomeException -> String) (\() -> "returned") end)
     ends `shouldContain` [show (True, show (Cancel "a"))]
 
   it "that polls a sensor keeps the fault of an uninterruptible reading" $

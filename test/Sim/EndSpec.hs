@@ -32,7 +32,7 @@ spec :: Spec
 spec = guarded $ do
   describe "The record of a mock world ends when the run does" records
   describe "With a finite endAt" ends
-  describe "The cause is reported" faults'
+  describe "The cause is reported" causes
   describe "A run that is well" wells
   describe "A run with many threads" wide
 
@@ -54,10 +54,10 @@ records = do
     , ("in a deadlock, in another thread", \act -> simulate (both (act (atomically retry)) (sleep 1)))
     , ("when it blocks outside of the simulation", \act -> simulate (act (newEmptyMVar >>= takeMVar)))
     ]
-    $ \(name, running') -> it ("and does not contain the unwinding: " ++ name) $ do
+    $ \(name, ran) -> it ("and does not contain the unwinding: " ++ name) $ do
       mock <- newMock
       motor <- motorOf mock
-      run <- running' motor
+      run <- ran motor
       case outcome run of
         Returned () -> expectationFailure "it returned"
         _ -> pure ()
@@ -159,8 +159,8 @@ wells = do
     (simulate (void (messages (const (pure ())))) >>= well)
       `shouldThrow` (== ErrorCall "it returned, but these threads were left running: driver: messages")
 
-faults' :: Spec
-faults' = do
+causes :: Spec
+causes = do
   it "for an exception whose text throws an exception" $ do
     run <- simulate (throwIO Unshowable :: Behavior ())
     explain (outcome run) `shouldBe` "it faulted: it was <its text throws an exception>"
@@ -177,12 +177,12 @@ faults' = do
     mock `shouldRecord` exactly 1 (faultOf "act")
   it "for a thread that blocks on a value that another thread computes" $ do
     begun <- newEmptyMVar
-    never' <- newEmptyMVar
-    let lazy = unsafePerformIO (putMVar begun () >> takeMVar never') :: Int
+    neverFilled <- newEmptyMVar
+    let lazy = unsafePerformIO (putMVar begun () >> takeMVar neverFilled) :: Int
     _ <- forkIO (void (evaluate lazy))
     takeMVar begun
     run <- simulateWith defaultSimOptions {realTimeLimit = 0.3} (void (evaluate lazy))
-    putMVar never' 1
+    putMVar neverFilled 1
     case outcome run of
       BlockedOutside thread InThunk -> show thread `shouldBe` "main"
       other -> expectationFailure (explain other)

@@ -26,7 +26,7 @@ spec :: Spec
 spec = guarded $ do
   describe "A scripted action" $ do
     describe "in each call" calls
-    describe "that takes time" taking'
+    describe "that takes time" takingTime
     describe "that receives a stop request" stopped
     describe "and its record" records
   describe "A scripted sensor" sensors
@@ -74,8 +74,8 @@ calls = do
     sort (concat tickets) `shouldBe` [1 .. 400]
     sort . map entryCall . filter ((== Succeeds) . entryKind) . recordEntries <$> happened mock
       `shouldReturn` [1 .. 400]
-    count' <- sensor mock "count" (map returning [1 :: Int ..])
-    counts <- mapConcurrently (const (replicateM 50 count')) "12345678"
+    counter <- sensor mock "count" (map returning [1 :: Int ..])
+    counts <- mapConcurrently (const (replicateM 50 counter)) "12345678"
     sort (concat counts) `shouldBe` [1 .. 400]
 
   it "throws the user's exceptions, recorded as failures or faults" $ do
@@ -102,8 +102,8 @@ calls = do
                      , "open \"back\": done (call 2)"
                      ]
 
-taking' :: Spec
-taking' = do
+takingTime :: Spec
+takingTime = do
   it "ends when its time is over" $ do
     mock <- newMock
     walk <- action mock "walk" [succeeds `taking` 1 `taking` 1.5, fails "tired" `taking` 0.5]

@@ -10,7 +10,7 @@ import Support (guarded)
 
 spec :: Spec
 spec = guarded $ do
-  describe "A record" reads'
+  describe "A record" aRecord
   describe "A claim" $ do
     describe "of existence" existence
     describe "of absence" absence
@@ -55,8 +55,8 @@ hold, doNotHold :: [Claim] -> Expectation
 hold claims = for_ claims $ \claim -> verdict claim day `shouldBe` Right ()
 doNotHold claims = for_ claims $ \claim -> day `shouldNotSatisfy` holds claim
 
-reads' :: Spec
-reads' = do
+aRecord :: Spec
+aRecord = do
   it "is shown as a timeline, with a line for each entry" $
     lines (show day)
       `shouldBe` [ " 0.0 s  low: is False"

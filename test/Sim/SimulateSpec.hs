@@ -326,11 +326,11 @@ unwinding = do
 beside :: Spec
 beside = do
   it "one that is cancelled is over: its threads are dispatched to it no more" $ do
-    before' <- total simulations
+    runningBefore <- total simulations
     begun <- newGate
     cancelling (void (simulate (open begun >> forever (sleep 1)))) (pass begun)
       `shouldReturn` CancelledBy (show (Cancel "the caller"))
-    total simulations `shouldReturn` before'
+    total simulations `shouldReturn` runningBefore
   it "two simulations at once are independent" $ do
     let once = simulateWith defaultSimOptions {scheduled = Seeded 7, detailedSteps = True} mission
     alone <- once

@@ -83,9 +83,9 @@ ordered order moments = allOf [sleep s >> atomically (modifyTVar' order (s :)) |
 
 -- | The orders in which sleepers with these durations wake, under many schedules.
 ordersWith :: Seconds -> [Seconds] -> IO [[Seconds]]
-ordersWith slip' moments = nub <$> mapM one [1 .. 200]
+ordersWith most moments = nub <$> mapM one [1 .. 200]
  where
   one seed = do
     order <- newTVarIO []
-    _ <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = slip'} (ordered order moments)
+    _ <- simulateWith defaultSimOptions {scheduled = Seeded seed, timerSlip = most} (ordered order moments)
     reverse <$> readTVarIO order

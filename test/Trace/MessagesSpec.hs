@@ -98,7 +98,7 @@ messagesTraced =
             , (Branch, "timeout: branch")
             , (Operator, "timeout")
             ]
-          startedBy' s = [r | b <- spanOf (spanParent s), r <- reactions, Just (reactionNumber r) == spanReaction b]
+          causesOf s = [r | b <- spanOf (spanParent s), r <- reactions, Just (reactionNumber r) == spanReaction b]
           message n = "handle " ++ show n
           inSpanOf s = (Named, "order: " ++ drop (length "handle ") (spanName s))
       pure . counterexample (unlines (map show (Sim.events run))) $
@@ -119,7 +119,7 @@ messagesTraced =
               | (s, _) <- calls "deliver"
               ]
           , conjoin
-              [ counterexample "a handler is started by a reaction" . property $ case startedBy' s of
+              [ counterexample "a handler is started by a reaction" . property $ case causesOf s of
                   [r] ->
                     reactionStarts r == Just "handler"
                       && reactionOperator r == "onMessage"

@@ -116,9 +116,9 @@ recordedRun around salt how w = do
               myPlace >>= \case
                 Nothing -> restore (around act)
                 Just place ->
-                  let both' = withReceiver (receiver True) (withReceiver (receiver False) (trace place))
-                   in inPlace (Just place {trace = both'}) (restore (around act))
-          , aroundPart = \here p run -> chance p >>= \isNamed -> within here p isNamed (\here' -> operating here' p run)
+                  let inBoth = withReceiver (receiver True) (withReceiver (receiver False) (trace place))
+                   in inPlace (Just place {trace = inBoth}) (restore (around act))
+          , aroundPart = \here p run -> chance p >>= \isNamed -> within here p isNamed (\inner -> operating inner p run)
           , aroundCleanup = \here act -> chance (Pure Unit) >>= \isNamed -> within here (Pure Unit) isNamed (const act)
           , whenSet = \condition level -> write (IsSet condition level)
           , ofSignal = \case

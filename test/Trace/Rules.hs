@@ -150,7 +150,7 @@ sameAmongNamed x =
   [ "differs: " ++ show (expected, given)
   | (expected, given) <-
       padded
-        [e' | (_, Received True _ e) <- es, Just e' <- [amongNamed' e]]
+        [e' | (_, Received True _ e) <- es, Just e' <- [shownAmongNamed e]]
         [e | (_, Received False _ e) <- es]
   , expected /= given
   ]
@@ -158,7 +158,7 @@ sameAmongNamed x =
   es = entries (recorded x)
   padded as bs =
     take (max (length as) (length bs)) (zip (map Just as ++ repeat Nothing) (map Just bs ++ repeat Nothing))
-  amongNamed' = \case
+  shownAmongNamed = \case
     Began s | spanKind s == Named -> Just (Began (nearest s))
     Ended s t end' | spanKind s == Named -> Just (Ended (nearest s) t end')
     Reacted r -> Just (Reacted r {reactionParent = fst (up (reactionParent r))})
@@ -345,8 +345,8 @@ causes x =
   times = Map.fromList [(at, t) | (at, _, _, t, _) <- Map.elems (over x)]
   own s o cause =
     let name = fromMaybe "" (stripPrefix (spanName o ++ ": ") (spanName s))
-        endOf' = maybe maxBound (\(at, _, _, _, _) -> at) (Map.lookup (spanNumber s) (over x))
-        others = [(at, n, e) | (at, n, e) <- siblings o, at < endOf']
+        itsEnd = maybe maxBound (\(at, _, _, _, _) -> at) (Map.lookup (spanNumber s) (over x))
+        others = [(at, n, e) | (at, n, e) <- siblings o, at < itsEnd]
         finishedNow n = [at | (at, n', e) <- others, n' == n, n' /= name, e == Succeeded]
         failedNow n = [at | (at, n', e) <- others, n' == n, n' /= name, wrong e]
         begunLater =
@@ -354,7 +354,7 @@ causes x =
           | (_, _, b) <- Map.elems (begun x)
           , spanParent b == Inside (spanNumber o)
           , not (isWorker (spanName b))
-          , any (realToFrac (spanBegan b) >) (Map.lookup endOf' times)
+          , any (realToFrac (spanBegan b) >) (Map.lookup itsEnd times)
           ]
         operatorEnd = (\(_, _, _, _, e) -> e) <$> Map.lookup (spanNumber o) (over x)
         itsProgram = snd <$> Map.lookup (spanNumber o) (partOf x)
@@ -509,7 +509,7 @@ values x =
         to = minimum (at : [at' | (k, (at', _, _)) <- Map.toList (begun x), k > n])
         t = round (reactionTime r) :: Int
         known = [one | one@(since, _, _, _, _) <- history (changeSignal c), since < to]
-        current = [show l | (_, when', until', untilAt, At l) <- known, until' > from, when' <= t, untilAt >= t]
+        current = [show l | (_, fromTime, toPlace, toTime, At l) <- known, toPlace > from, fromTime <= t, toTime >= t]
      in changeAfter c `elem` current && maybe True (`elem` [show l | (_, _, _, _, At l) <- known]) (changeBefore c)
   -- When a condition had which level: places in the record, and times.
   history condition =

@@ -26,7 +26,7 @@ spec :: Spec
 spec = guarded $ do
   describe "A sink" receiving
   describe "A sink that blocks" blocking
-  describe "A sink that throws" throwing'
+  describe "A sink that throws" throwingSinks
   describe "In a simulation, a sink" simulated
 
 receiving :: Spec
@@ -136,8 +136,8 @@ blocking = do
       putMVar never ()
       eventually ((== 0) <$> liveThreadCount)
 
-throwing' :: Spec
-throwing' = do
+throwingSinks :: Spec
+throwingSinks = do
   for_ [("an exception", toException (Fault "disk")), ("an asynchronous exception", toException ThreadKilled)] $
     \(what, e) ->
       it ("receives nothing more, is reported once, and does not disturb the others: " ++ what) $

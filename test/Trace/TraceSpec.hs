@@ -42,7 +42,7 @@ spec = guarded $ do
 
 naming :: Spec
 naming = do
-  for_ [("without a trace", False), ("in a trace", True)] $ \(where', isOn) -> describe where' $ do
+  for_ [("without a trace", False), ("in a trace", True)] $ \(situation, isOn) -> describe situation $ do
     let traced :: Behavior a -> Behavior a
         traced act = if isOn then withTrace [] act else act
     it "gives the result, and throws what the behaviour throws" $ do
@@ -348,9 +348,9 @@ reactions = do
   it "shows names and values wherever the trace begins" $ do
     let begun = summary . snd <$> tracedWith defaultTraceOptions {withOperators = True} reacting
         summary seen = ([reactionChanges r | Reacted r <- seen], parentsOf seen)
-        inPlaceOf around' = do
+        inPlaceOf wrapped = do
           seen <- newTVarIO ([], [])
-          () <- around' (begun >>= atomically . writeTVar seen)
+          () <- wrapped (begun >>= atomically . writeTVar seen)
           readTVarIO seen
     expected <- begun
     fst expected
@@ -378,9 +378,9 @@ reactions = do
         level <- newTVarIO (100 :: Int)
         inside <- changed <$> Signal.withShared (watched level) (traceOf . drive level)
         atomically (writeTVar level 100)
-        around' <- changed <$> traceOf (Signal.withShared (watched level) (drive level))
+        outside <- changed <$> traceOf (Signal.withShared (watched level) (drive level))
         inside `shouldBe` [[Change "battery" (Just "100") "5", Change "low" (Just "False") "True"]]
-        around' `shouldBe` inside
+        outside `shouldBe` inside
 
   it "names of ordered rules those whose conditions have changed, and decide" $ do
     run <- simulateWith defaultSimOptions $ do

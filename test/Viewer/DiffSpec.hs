@@ -39,7 +39,7 @@ spec = do
   it "do not include the values of signals, which are never the same twice" $
     firstDivergence (between (stopped "9.4") (stopped "9.3")) `shouldBe` Nothing
   it "do not include how long something had run that was stopped" $
-    firstDivergence (between (stoppedAfter' 60 3) (stoppedAfter' 50 5)) `shouldBe` Nothing
+    firstDivergence (between (stoppedAt 60 3) (stoppedAt 50 5)) `shouldBe` Nothing
   it "have the path with the largest difference of the totals first" . property $ \(Related a) (Related b) ->
     let sizes = [abs (sideTotal x - sideTotal y) | (_, x, y) <- timesByPath (between a b)]
     in and (zipWith (>=) sizes (drop 1 sizes))
@@ -56,7 +56,7 @@ spec = do
   deep end = concat [ended n (Inside (n - 1)) "deeper" 0 Nothing end Succeeded | n <- [1 .. 10000]]
   inEachOther end = ended 2 (Inside 1) "b" 0 Nothing 1 end ++ ended 1 Top "a" 0 Nothing 1 end
   stopped value = ended 1 Top "a" 0 Nothing 1 (StoppedBy (SignalChanged 2 [Change "battery" Nothing value]))
-  stoppedAfter' t took =
+  stoppedAt t took =
     ended 1 Top "a" 0 Nothing t (StoppedBy (SignalChanged 3 []))
       ++ ended 2 Top "b" (t - took) Nothing t (StoppedBy (SignalChanged 3 []))
       ++ [Reacted (Reaction 3 Top "monitor" t [] (Just (StoppedBranch "task" t 0 Succeeded)) Nothing)]

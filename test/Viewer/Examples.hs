@@ -45,7 +45,7 @@ ended n parent name begin reaction end how = [Began s, Ended s end how]
 -- events are lost.
 mission :: [Event]
 mission =
-  [ Began mission'
+  [ Began missionSpan
   , Began enter
   , Began front
   , Ended front 2.4 (FailedWith "locked")
@@ -69,7 +69,7 @@ mission =
   , Lost 2
   ]
  where
-  mission' = Span 1 Top Named "mission" 0 Nothing
+  missionSpan = Span 1 Top Named "mission" 0 Nothing
   enter = Span 2 (Inside 1) Named "enter room" 0.4 Nothing
   front = Span 3 (Inside 2) Named "front door" 0.5 Nothing
   back = Span 4 (Inside 2) Named "back door" 2.4 Nothing
@@ -161,23 +161,23 @@ isHarmless c = generalCategory c `notElem` [Control, Format, Surrogate, LineSepa
 -- | A mission of about that number of spans: rounds of a few steps, some of which fail, some of
 -- which are stopped.
 long :: Int -> [Event]
-long n = Began root : concatMap round' [1 .. rounds] ++ [Ended root (at (rounds + 1)) Succeeded]
+long n = Began root : concatMap roundOf [1 .. rounds] ++ [Ended root (at (rounds + 1)) Succeeded]
  where
   rounds = max 1 ((n + 6) `div` 7)
   root = Span 1 Top Named "patrol" 0 Nothing
   at k = 7 * fromIntegral k :: Seconds
-  round' k = Began r : concatMap step [1 .. 6] ++ reaction ++ [Ended r (at k + 6.9) (how r)]
+  roundOf k = Began r : concatMap step [1 .. 6] ++ reaction ++ [Ended r (at k + 6.9) (how r)]
    where
     base = 10 * k
     r = Span base (Inside 1) Named ("round " ++ show k) (at k) Nothing
     isStopped = k `mod` 97 == 40
     how _ = Succeeded
     step j
-      | j == 3 && k `mod` 211 == 100 = both' j (FailedWith ("door " ++ show k ++ " locked"))
-      | j == 4 && isStopped = both' j (StoppedBy (SignalChanged (base + 9) changes))
-      | j == 5 && k `mod` 1009 == 500 = both' j (FaultedWith "no such device")
-      | otherwise = both' j Succeeded
-    both' j end = [Began (inner j), Ended (inner j) (at k + fromIntegral j + 0.8) end]
+      | j == 3 && k `mod` 211 == 100 = beginAndEnd j (FailedWith ("door " ++ show k ++ " locked"))
+      | j == 4 && isStopped = beginAndEnd j (StoppedBy (SignalChanged (base + 9) changes))
+      | j == 5 && k `mod` 1009 == 500 = beginAndEnd j (FaultedWith "no such device")
+      | otherwise = beginAndEnd j Succeeded
+    beginAndEnd j end = [Began (inner j), Ended (inner j) (at k + fromIntegral j + 0.8) end]
     inner j =
       Span (base + j) (Inside base) Named (names !! (j - 1)) (at k + fromIntegral j) (startedBy j)
     startedBy j = if j == 5 && isStopped then Just (base + 9) else Nothing

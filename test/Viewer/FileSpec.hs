@@ -39,7 +39,7 @@ spec = do
       parseTrace (renderTrace header events) === Right (header, map replaced events, Nothing)
     it "NaN can be read back" $
       case parseTrace (renderTrace header [Began (Span 1 Top Named "x" (0 / 0) Nothing)]) of
-        Right (_, [Began s], Nothing) -> spanBegan s `shouldSatisfy` isNaN'
+        Right (_, [Began s], Nothing) -> spanBegan s `shouldSatisfy` isNotANumber
         other -> expectationFailure (show other)
     it "each event is one line, without a character that a terminal or a page acts on" . property $
       \(AnyEvents events) ->
@@ -235,7 +235,7 @@ spec = do
         (parseTrace (Bytes.intercalate "\r\n" (Bytes.lines (renderTrace header detailed)) <> "\r\n"))
         `shouldBe` Right detailed
  where
-  isNaN' t = t /= t
+  isNotANumber t = t /= t
   encodedLost = "{\"event\":\"lost\",\"count\":1}\n"
 
 -- The first n bytes of the file: all complete events, and the rest is reported.

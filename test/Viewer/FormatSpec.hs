@@ -66,10 +66,10 @@ written =
 
 fieldsOf :: Text -> Value -> Fields
 fieldsOf kind (Object o) =
-  Map.unionsWith (Map.unionWith Set.union) (Map.singleton kind' (Map.fromList (map field fields)) : map inner fields)
+  Map.unionsWith (Map.unionWith Set.union) (Map.singleton title (Map.fromList (map field fields)) : map inner fields)
  where
   fields = [(Key.toText key, value) | (key, value) <- KeyMap.toList o]
-  kind' = case KeyMap.lookup "event" o of
+  title = case KeyMap.lookup "event" o of
     Just (String event) | Text.null kind -> "Event: " <> event
     _ -> kind
   field (key, String value) = (key, Set.singleton value)

@@ -104,9 +104,9 @@ anyTime =
     ]
 
 oddText :: Gen String
-oddText = frequency [(3, listOf odd'), (1, getUnicodeString <$> arbitrary), (1, pure "")]
+oddText = frequency [(3, listOf oddCharacter), (1, getUnicodeString <$> arbitrary), (1, pure "")]
  where
-  odd' =
+  oddCharacter =
     frequency
       [ (4, choose ('a', 'z'))
       , (2, choose ('\NUL', '\x9F'))

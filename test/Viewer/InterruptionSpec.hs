@@ -39,10 +39,10 @@ spec = do
       `shouldBe` ["monitor changed -> stopped its task after 3.1 s (took 0.3 s) -> recovery"]
     take 1 (inTerminal (map unnamed nameless)) `shouldBe` ["monitor changed"]
   it "has the time of the span that was stopped, not that of its branch" $ do
-    let words' = "stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""
-    inTree secondStep `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ words']
-    inTerminal secondStep `shouldBe` ["battery 9.4 -> batteryLow True", words']
-    inTimeline secondStep `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ words']
+    let sentence = "stopped \"drive\" after 3.1 s (took 0.3 s) -> \"recharge\""
+    inTree secondStep `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ sentence]
+    inTerminal secondStep `shouldBe` ["battery 9.4 -> batteryLow True", sentence]
+    inTimeline secondStep `shouldBe` ["battery 9.4 -> batteryLow True -> " ++ sentence]
   it "has the time of each span, if they differ" $ do
     inTree (stoppedAt 60 [57, 55])
       `shouldSatisfy` any ("stopped \"robot 1\" after 3 s, \"robot 2\" after 5 s (took" `isInfixOf`)
@@ -55,11 +55,11 @@ spec = do
   it "says how long stopping took only if it took a time" $ do
     let atOnce took end =
           [if isReaction e then reactionThat (Just (StoppedBranch "task" 3.1 took end)) else e | e <- patrol]
-        words' = "battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s -> \"recharge\""
-    map (\took -> inTree (atOnce took (low 4))) [0, 0.00001] `shouldBe` [[words'], [words']]
+        sentence = "battery 9.4 -> batteryLow True -> stopped \"drive\" after 3.1 s -> \"recharge\""
+    map (\took -> inTree (atOnce took (low 4))) [0, 0.00001] `shouldBe` [[sentence], [sentence]]
     inTerminal (atOnce 0 (low 4))
       `shouldBe` ["battery 9.4 -> batteryLow True", "stopped \"drive\" after 3.1 s -> \"recharge\""]
-    inTimeline (atOnce 0 (low 4)) `shouldBe` [words']
+    inTimeline (atOnce 0 (low 4)) `shouldBe` [sentence]
     inTree (atOnce 0 Succeeded) `shouldSatisfy` any ("after 3.1 s (it completed nevertheless) ->" `isInfixOf`)
   it "says what starts, if nothing was stopped" $ do
     let events = [if isReaction e then reactionThat Nothing else e | e <- patrol]

@@ -121,7 +121,7 @@ pseudoTerminals = do
 -- Runs the action with a handle of a terminal, which the standard output and the standard error are too; and with an
 -- action that waits until this text has been written to the terminal. Gives all that has been written.
 inTerminal :: (Handle -> (String -> IO ()) -> IO a) -> IO (a, Bytes.ByteString)
-inTerminal act = within' $ do
+inTerminal act = withinAMinute $ do
   (master, slave) <- openPseudoTerminal
   written <- newTVarIO []
   ended <- newEmptyMVar
@@ -134,7 +134,7 @@ inTerminal act = within' $ do
   takeMVar ended
   (,) a . Bytes.concat . reverse <$> readTVarIO written
  where
-  within' run = timeout 60000000 run >>= maybe (throwIO (ErrorCall "not over after a minute")) pure
+  withinAMinute run = timeout 60000000 run >>= maybe (throwIO (ErrorCall "not over after a minute")) pure
   -- (When all have closed the terminal, to read is an error.)
   collect reader written = do
     piece <- try (Bytes.hGetSome reader 4096)

@@ -29,9 +29,9 @@ spec = do
       map (spanNumber . nodeSpan) (recordingRoots (recording (circle Named))) `shouldBe` [1, 2]
     -- (Span 2 is in 4, 4 in 3, 3 in 2; and 5, which has a name, is in 4.)
     it "ends, also through operators" $
-      ending (withoutOperators (circle Operator ++ named')) `shouldReturn` [inside 4]
+      ending (withoutOperators (circle Operator ++ driving)) `shouldReturn` [inside 4]
     it "ends, also of an operator that is in itself" $
-      ending (withoutOperators (Began (Span 4 (Inside 4) Operator "x" 0 Nothing) : named')) `shouldReturn` [inside 4]
+      ending (withoutOperators (Began (Span 4 (Inside 4) Operator "x" 0 Nothing) : driving)) `shouldReturn` [inside 4]
     it "ends, also of a reaction in it" $
       ending (withoutOperators (circle Branch ++ [Reacted (Reaction 6 (Inside 3) "x" 0 [] Nothing Nothing)]))
         `shouldReturn` [inside 4]
@@ -47,7 +47,7 @@ spec = do
   circle kind =
     [Began (Span n (Inside p) kind "x" 0 Nothing) | (n, p) <- [(2, 4), (3, 2), (4, 3)]]
       ++ [Began (Span 1 Top Named "y" 0 Nothing) | kind == Named]
-  named' = [Began (Span 5 (Inside 4) Named "drive" 0 Nothing)]
+  driving = [Began (Span 5 (Inside 4) Named "drive" 0 Nothing)]
   inside = Just . Inside
   ending events =
     timeout 10000000 (evaluate (length (show events)))

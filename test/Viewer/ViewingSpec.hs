@@ -23,7 +23,7 @@ import Viewer.Temporary
 spec :: Spec
 spec = do
   it "writes both files" . withPath $ \path -> do
-    viewing (both' path) (named "drive" (pure ())) `shouldReturn` ()
+    viewing (toFiles path) (named "drive" (pure ())) `shouldReturn` ()
     Right (_, events, Nothing) <- parseTrace . Lazy.fromStrict <$> Strict.readFile path
     length events `shouldBe` 2
     drawn <- readFile (path ++ ".svg")
@@ -62,7 +62,7 @@ spec = do
     result <- try (viewing (trace path) (closeBehindIt path))
     (result, "") `shouldSatisfy` isProblem path
  where
-  both' path = Viewing (Just path) (Just (path ++ ".svg")) False
+  toFiles path = Viewing (Just path) (Just (path ++ ".svg")) False
   trace path = defaultViewing {traceFile = Just path}
   picture path = defaultViewing {timelineFile = Just path}
   isProblem :: FilePath -> (Either IOException (), String) -> Bool

@@ -52,7 +52,7 @@ attack = do
           which <- below 13
           a <- here <$> tree (n - 1)
           b <- here <$> tree (n - 1)
-          let odd' = Signal.polling 0.0003 (here (odd <$> atomically (readTVar flag)))
+          let odds = Signal.polling 0.0003 (here (odd <$> atomically (readTVar flag)))
               watched = odd <$> Signal.watching (readTVar flag)
           case which of
             0 -> pure (parallel a b)
@@ -64,11 +64,11 @@ attack = do
               c <- fork nursery a
               _ <- fork nursery b
               Time.sleep 0.0005 >> requestStop c
-            6 -> never (\alone -> Signal.monitor odd' (alone a) (alone b))
+            6 -> never (\alone -> Signal.monitor odds (alone a) (alone b))
             7 -> never (\alone -> Signal.rSelect watched (alone a) (alone b))
             8 -> pure (void (Time.timeout 0.0007 a) ? b)
             9 -> never $ \alone ->
-              Signal.withShared (Signal.debounce 0.0001 odd') (\s -> Signal.switch s (\i -> alone (if i then a else b)))
+              Signal.withShared (Signal.debounce 0.0001 odds) (\s -> Signal.switch s (\i -> alone (if i then a else b)))
             10 ->
               let delivers deliver = here (forever (deliver () >> Time.sleep 0.0006))
               in pure (withInbox 3 delivers (\inbox -> onMessage inbox (\() -> pure () <$ a) b))
@@ -93,8 +93,8 @@ attack = do
     let killing t = do
           threadDelay wait >> mapM_ killThread throwers
           forever (throwTo t ThreadKilled >> threadDelay 20000)
-        last' t = forkIO (killing t) >>= putMVar killer
-    _ <- endsWithin 20000 what last' program
+        atEnd t = forkIO (killing t) >>= putMVar killer
+    _ <- endsWithin 20000 what atEnd program
     takeMVar killer >>= killThread
     killThread changing
     noThreads what

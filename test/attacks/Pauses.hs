@@ -21,8 +21,8 @@ import Behavior.Time (sleepForever, timeout)
 attack :: IO ()
 attack = do
   random <- newIORef 7
-  forM_ [pausing, holding, goingOn, agreement] $ \round' -> replicateM_ 2000 $ do
-    round' (below random)
+  forM_ [pausing, holding, goingOn, agreement] $ \storm -> replicateM_ 2000 $ do
+    storm (below random)
     n <- liveThreadCount
     promise (show n ++ " threads were left") (n == 0)
 
@@ -98,9 +98,9 @@ goingOn random = do
         fails <- random 6
         when (fails == 0) failed
         atomicModifyIORef' done (\known -> (Map.insertWith (+) (order, step) (1 :: Int) known, ()))
-      serve order = mask_ (resumableFor progress order [1 .. 4 :: Int] (interruptible' . carryOut order) >>= atomically)
+      serve order = mask_ (resumableFor progress order [1 .. 4 :: Int] (interruptibly . carryOut order) >>= atomically)
       -- (What it has done must be the last step, and masked; so it can be interrupted only before that.)
-      interruptible' act = busy random 3 >> allowInterrupt >> act
+      interruptibly act = busy random 3 >> allowInterrupt >> act
       untilServed order = hurt random (serve order) >>= either (const (untilServed order)) pure
   mapM_ untilServed [1 .. 3 :: Int]
   steps <- readIORef done

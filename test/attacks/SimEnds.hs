@@ -63,7 +63,7 @@ program = do
   pure (show r)
  where
   masked d = do
-    mask_ (checkpoint' >> checkpoint') `finally` checkpoint'
+    mask_ (sleepZero >> sleepZero) `finally` sleepZero
     uninterruptibleMask_ (sleep d)
-    mask_ (sleep d `catch` \(_ :: Boom) -> checkpoint')
-  checkpoint' = sleep 0
+    mask_ (sleep d `catch` \(_ :: Boom) -> sleepZero)
+  sleepZero = sleep 0

@@ -61,8 +61,8 @@ attack = do
     milliseconds 2000
     (cpu, wall) <- (,) <$> getCPUTime <*> getMonotonicTime
     milliseconds 3000
-    (cpu', wall') <- (,) <$> getCPUTime <*> getMonotonicTime
-    let share = fromIntegral (cpu' - cpu) / 1e12 / (wall' - wall) :: Double
+    (cpuAfter, wallAfter) <- (,) <$> getCPUTime <*> getMonotonicTime
+    let share = fromIntegral (cpuAfter - cpu) / 1e12 / (wallAfter - wall) :: Double
     putStrLn (what ++ ": " ++ show share ++ " of a processor while all wait")
     putMVar gate ()
     _ <- inThread 20000 what finish

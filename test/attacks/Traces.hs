@@ -59,10 +59,10 @@ storms = do
         tree 0 p = leaf p
         tree n p = do
           which <- below 22
-          let in' x = p ++ "/" ++ (case which of 16 -> "~"; 18 -> "adopted/"; _ -> "") ++ x
-          a <- tree (n - 1) (in' "a")
-          b <- tree (n - 1) (in' "b")
-          let reading = named (in' "reading") (pure False)
+          let sub x = p ++ "/" ++ (case which of 16 -> "~"; 18 -> "adopted/"; _ -> "") ++ x
+          a <- tree (n - 1) (sub "a")
+          b <- tree (n - 1) (sub "b")
+          let reading = named (sub "reading") (pure False)
               sensor = Signal.polling 0.0005 reading
           pure . named p $ case which of
             0 -> parallel a b
@@ -70,13 +70,13 @@ storms = do
             2 -> a ? b
             3 -> firstOf [a, b]
             4 -> void (allOf [a, b])
-            5 -> scoped (\nursery -> named (in' "body") (pure ()) >> fork nursery a >>= \c -> b `finally` requestStop c)
+            5 -> scoped (\nursery -> named (sub "body") (pure ()) >> fork nursery a >>= \c -> b `finally` requestStop c)
             6 -> Signal.monitor sensor a b
             7 -> monitor reading a b
             8 -> void (Time.timeout 0.0003 a) ? b
             9 -> Signal.withShared (not <$> sensor) (`Signal.whileHolding` parallel a b)
             10 -> mask_ (parallel a b)
-            11 -> uninterruptibleMask_ (named (in' "masked") (pure ())) >> attempt 2 a
+            11 -> uninterruptibleMask_ (named (sub "masked") (pure ())) >> attempt 2 a
             12 ->
               let finishing inbox = onMessage inbox (\() -> a >> pure (pure ())) b
               in withInbox 3 (\deliver -> pure () <$ deliver ()) finishing
@@ -157,7 +157,7 @@ check what root events = do
         Left "unknown" -> unless ("?" == spanName s || "~" `isInfixOf` spanName s) $ wrong "unknown parent" e
         Left text -> wrong text e
       case spanParent s of
-        Inside n -> readIORef open >>= \now' -> unless (IntMap.member n now') $ wrong "its parent has ended" e
+        Inside n -> readIORef open >>= \openSpans -> unless (IntMap.member n openSpans) $ wrong "its parent has ended" e
         _ -> pure ()
     Ended s _ how -> do
       let abandoned = how == StoppedBy WasAbandoned
@@ -298,14 +298,14 @@ sameResults = forM_ (zip [1 :: Int ..] programs) $ \(k, program) -> do
 -- | Tens of thousands of threads in a trace, and as many exceptions, leave nothing.
 memory :: IO ()
 memory = do
-  let round' = withTrace [] . named "r" $ adopt >>= \here -> replicateM_ 8000 $ do
+  let burst = withTrace [] . named "r" $ adopt >>= \here -> replicateM_ 8000 $ do
         insideThread (here (named "x" (pure ())))
         insideThread (named "y" (pure ()))
         both (named "a" yield) (named "b" yield)
         void (try (named "c" (throwIO (Boom 1))) :: IO (Either Boom ()))
-  round'
+  burst
   before <- live
-  round'
+  burst
   after <- live
   promise ("after " ++ show before ++ " bytes there are " ++ show after) (after < before + 200000)
  where

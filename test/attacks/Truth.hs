@@ -209,14 +209,14 @@ compared world events = do
       around s = case spanParent s of
         Inside n | Just o <- IntMap.lookup n begun -> o : around o
         _ -> []
-      endOf' = IntMap.fromListWith (++) [(spanNumber s, [(t, end)]) | (s, t, end) <- ends]
+      endsOf = IntMap.fromListWith (++) [(spanNumber s, [(t, end)]) | (s, t, end) <- ends]
       isLoose s = or [spanParent o == UnknownParent || "~" `isInfixOf` spanName o | o <- s : around s]
       wrong :: Show x => String -> x -> [String]
       wrong text what = [text ++ ": " ++ show what]
       spans = [w | Began s <- events, w <- ofSpan s]
       ofSpan s = concat
         [ wrong "it has not one end" (s, found)
-        | let found = IntMap.findWithDefault [] (spanNumber s) endOf'
+        | let found = IntMap.findWithDefault [] (spanNumber s) endsOf
         , length found /= 1
         , not (null found && isLoose s)
         ]
@@ -228,7 +228,7 @@ compared world events = do
           ]
         ++ (if spanKind s == Named && not (isLoose s) then ofNamed s else [])
       within s o = spanBegan o <= spanBegan s && and [t <= t' | (t, _) <- theEnd s, (t', _) <- theEnd o]
-      theEnd s = IntMap.findWithDefault [] (spanNumber s) endOf'
+      theEnd s = IntMap.findWithDefault [] (spanNumber s) endsOf
       ofNamed s = case IntMap.lookup (spanNumber s) runOf of
         Nothing -> wrong "it never ran" s
         Just r ->
@@ -320,8 +320,8 @@ compared world events = do
         , wrongRun <- wrong "runs without a span" (name, length rs, known)
         ]
       doubled = [n | (n, _ : _ : _) <- Map.toList reactions]
-      all' = spans ++ ofReactions ++ lostRuns ++ concat [wrong "reactions that came twice" doubled | not (null doubled)]
-  pure (listToMaybe all')
+      twice = concat [wrong "reactions that came twice" doubled | not (null doubled)]
+  pure (listToMaybe (spans ++ ofReactions ++ lostRuns ++ twice))
 
 awaitNoThreads :: String -> IO ()
 awaitNoThreads what = go (5000 :: Int)

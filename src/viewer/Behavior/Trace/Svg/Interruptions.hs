@@ -113,12 +113,12 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
     distinct = nubBy (\(_, a, _, _) (_, b, _, _) -> a == b)
   -- (Between slivers in one lane such arrows would be a tangle: each of these bars ends where the next one begins.)
   pairsOf m =
-    [(from, to) | r <- markerReactions m, from : _ <- [found stopped r], to : _ <- [found started r], isSeen from to]
+    [(from, to) | r <- markerReactions m, from : _ <- [ofMark stopped r], to : _ <- [ofMark started r], isSeen from to]
   isSeen from to = placedLane from /= placedLane to || not (any isSliver [from, to])
   isSliver p = widthOf p < 8
   -- What was stopped; else what was started; else where nothing has a name in what the operator ran in; else that. The
   -- pixel at which the arrow ends is not where two bars meet. With the width of what is there.
-  targetsOf at r = case (found stopped r, found started r) of
+  targetsOf at r = case (ofMark stopped r, ofMark started r) of
     ([], []) -> case reactionParent r of
       Inside n | Just p <- IntMap.lookup n byNumber ->
         if any (isPause (placedLane p + 1) at) pauses
@@ -141,7 +141,7 @@ layInterruptions left right (barHeight, gap) x y placed pauses recorded =
   isThin = not (isFew 40 markers)
   isFew n = null . drop n
   below (a, b) = (min a b - 6, max a b + 6)
-  found known r = IntMap.findWithDefault [] (reactionNumber r) known
+  ofMark known r = IntMap.findWithDefault [] (reactionNumber r) known
 
   label (m, (row, known)) =
     path (effectClass (effectOf m)) (diamond (markerX m) (rowY m row)) (titled about)
