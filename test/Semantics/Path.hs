@@ -84,7 +84,8 @@ explains fuel visible world seen = go (Set.singleton (initial world)) (filter (v
     Deadlock -> Nothing
   at t = filter ((== t) . clock . now) . Set.toList
 
--- | Every timeline that the relation allows, with its end. Nothing: more than fuel.
+-- | Every timeline that the relation allows, with its end. Nothing: more than fuel, or one that is longer than
+-- that. (One that does not end, is: @every@ goes on after a stop request despite which its action completed.)
 paths :: Int -> (Transition -> Bool) -> World -> Maybe (Set Seen)
 paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world))
  where
@@ -98,7 +99,7 @@ paths fuel visible world = Set.fromList <$> go [] (Set.singleton (initial world)
         here = [Seen {timeline = reverse past, end = e} | e <- Set.toList results]
     foldM
       (\found (seen, states') -> do
-          more <- go (seen : past) states'
+          more <- if length past >= fuel then Nothing else go (seen : past) states'
           if length found > fuel then Nothing else Just (more ++ found))
       here
       (Map.toList next)
