@@ -72,7 +72,7 @@ rover = do
     reportStarted tried `shouldContain` ["drive home"]
 
   it "stops its motor in reality" $
-    trial (\stage -> untilButton stage (goHome stage)) [(0, True)] id
+    trial (\robot -> untilButton robot (goHome robot)) [(0, True)] id
 
 -- | The exploration fails, and its output is the page's text block with this number.
 failsAs :: IO Report -> Int -> Expectation
