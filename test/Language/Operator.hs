@@ -17,6 +17,7 @@ module Language.Operator
   , forks
   , abandons
   , receives
+  , atOnce
 
     -- * Random operators
   , Around (..)
@@ -187,6 +188,18 @@ receives :: Operator s p -> Bool
 receives = \case
   OnMessage _ _ -> True
   HandleNext _ -> True
+  _ -> False
+
+-- | Whether all its branches run at once. (Those of the others run one after the other.)
+atOnce :: Operator s p -> Bool
+atOnce = \case
+  Parallel _ _ -> True
+  Both _ _ -> True
+  FirstOf _ -> True
+  AllOf _ -> True
+  Decide {} -> True
+  WithShared _ _ -> True
+  Scoped _ -> True
   _ -> False
 
 -- * Random operators

@@ -4,8 +4,7 @@
 {-# LANGUAGE PatternSynonyms #-}
 
 -- |
--- Programs whose leaves are actions that take time: for the specification, the promises, the traces, and the
--- stress tests.
+-- Programs whose leaves are actions that take time: for the specification, and for the traces.
 --
 -- An action has a name, and a script for each call: how many ticks it takes, how it then
 -- ends, and how it responds to a stop request. A condition is a variable that the

@@ -20,15 +20,17 @@ import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (unless, void, when)
+import Data.Foldable (traverse_)
 import Data.Maybe (fromMaybe, listToMaybe)
 import Test.QuickCheck (Gen, choose, elements, frequency, vectorOf)
 
-import Behavior (Behavior, BehaviorFailed, attempt, both, failingOn, fallback, parallel)
+import Behavior (Behavior, attempt, both, failingOn, fallback, parallel)
 import Behavior.Internal.Core.Failure (isCancellation)
 import qualified Behavior.Parallel as Parallel
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)
+import Places
 import Promises.Stage
 import Support (Cancel (..), Ending (..), hang)
 
@@ -45,35 +47,23 @@ data Level
   | -- | Stops the next level after the given number of ticks, or when another branch ends.
     ByTimeout Int
   | ByNeighbour
-  deriving (Eq, Show)
-
-data Place
-  = InParallel
-  | InBoth
-  | InFirst
-  | InAll
-  | InDecision
-  | InSelect
-  | InTask
-  | InHolding
-  | InTimeout
-  | InAttempt
-  | InFailing
-  | InScope
-  deriving (Bounded, Enum, Eq, Show)
+  deriving (Show)
 
 levels :: Size -> Gen Levels
 levels size = do
   stops <- elements [ByNeighbour, ByTimeout 0, ByTimeout 1, ByTimeout 2]
   case size of
-    Tiny -> Levels <$> elements [[Around InHolding, Around InAttempt], [stops]]
+    Tiny -> Levels <$> elements [[Around holding, Around trying], [stops]]
     Full -> do
       before <- choose (0, 2) >>= \n -> vectorOf n around
       after <- choose (0, 2) >>= \n -> vectorOf n around
       stopping <- frequency [(3, pure [stops]), (1, pure [])]
       pure (Levels (before ++ stopping ++ after))
  where
-  around = Around <$> elements [minBound .. maxBound]
+  around = Around <$> elements (trying : takingAll : places)
+  holding = Place "whileHolding" Nothing (Signal.whileHolding (pure True))
+  trying = Place "attempt 3" Nothing (attempt 3)
+  takingAll = Place "failingOn any" Nothing (failingOn (const True :: SomeException -> Bool))
 
 -- | The operator that stops its branch continues after the stop. The operators inside do not
 -- continue, not even with a fallback; those around it are not affected.
@@ -89,18 +79,7 @@ stoppedAtItsOwnLevel stage (Levels these) = do
          in (level `doing` (act `fallingBack` n)) >> when (isStop level) (append continued n)
       fallingBack act n = fallback act (append continued (100 + n :: Int))
       doing level act = case level of
-        Around InParallel -> parallel act hang
-        Around InBoth -> both (pure ()) act
-        Around InFirst -> Parallel.firstOf [act, hang]
-        Around InAll -> void (Parallel.allOf [act, pure ()])
-        Around InDecision -> Parallel.decide firstEnd [act, hang]
-        Around InSelect -> Signal.rSelect (pure False) hang act
-        Around InTask -> Signal.monitor (pure False) hang act
-        Around InHolding -> Signal.whileHolding (pure True) act
-        Around InTimeout -> timeout (fromIntegral untilStopped * tick stage) act
-        Around InAttempt -> attempt 3 act
-        Around InFailing -> failingOn (const True :: SomeException -> Bool) act
-        Around InScope -> beside [hang] act
+        Around place -> placed place act
         ByNeighbour -> parallel act (atomically (readTVar inside >>= check))
         ByTimeout n -> fallback (timeout (fromIntegral n * tick stage) act) (pure ())
       whole
@@ -179,11 +158,7 @@ stoppedTogether stage (Group composition handlings cause) = do
       others = map member handlings
       culprit = [allInside >> void (finish 0 Fails) | cause == ByFailure]
       together = case (composition, others ++ culprit) of
-        (AsAll, these) -> void (Parallel.allOf these)
-        (AsDecision, these) -> Parallel.decide firstEnd these
-        (AsPair, [a, b]) -> both a b
-        (AsRace, [a, b]) -> parallel a b
-        (AsForks, a : these) -> beside these a
+        (AsForks, a : these) -> Parallel.scoped (\nursery -> traverse_ (Parallel.fork nursery) these >> a)
         (AsTaskAndSensor, [a, b]) -> do
           readings <- newTVarIO (0 :: Int)
           -- The task starts by the first reading; the second reading is the other member.
@@ -191,7 +166,7 @@ stoppedTogether stage (Group composition handlings cause) = do
                 k <- atomically (modifyTVar' readings (+ 1) >> readTVar readings)
                 False <$ when (k > 1) b
           Signal.monitor (Signal.polling (tick stage) reading) hang a
-        (_, these) -> Parallel.firstOf these
+        (_, these) -> void (composed composition (map (0 <$) these))
       stimuli = case cause of
         ByCaller -> [(0, Changes ()), (0, CancelsCaller)]
         ByFailure -> [(0, Changes ())]
@@ -201,9 +176,15 @@ stoppedTogether stage (Group composition handlings cause) = do
     (ByFailure, Gave (FailedWith _)) -> pure ()
     _ -> broken ("it ended: " ++ show end)
 
--- | Chooses what has ended first; on a tie the leftmost.
-firstEnd :: [Maybe (Either BehaviorFailed a)] -> Maybe (Behavior a)
-firstEnd outcomes = listToMaybe [either throwIO pure end | Just end <- outcomes]
+-- | Runs them at once. Gives the sum of their results, that of the first, or zero.
+composed :: Composition -> [Behavior Int] -> Behavior Int
+composed composition these = case (composition, these) of
+  (AsAll, _) -> sum <$> Parallel.allOf these
+  -- What has ended first; on a tie the leftmost.
+  (AsDecision, _) -> Parallel.decide (\ends -> listToMaybe [either throwIO pure end | Just end <- ends]) these
+  (AsPair, [a, b]) -> 0 <$ both a b
+  (AsRace, [a, b]) -> 0 <$ parallel a b
+  _ -> Parallel.firstOf these
 
 -- * Ties
 
@@ -232,26 +213,20 @@ leftWins stage (Relay composition n runners) = do
         (k, wait >> mask_ (myThreadId >>= atomically . putTMVar variable >> finish k how))
       runs = zipWith3 runner runners before threadIds
       these = [fromMaybe hang (lookup k runs) | k <- [0 .. n - 1]]
-      whole = case (composition, these) of
-        (AsAll, _) -> sum <$> Parallel.allOf these
-        (AsDecision, _) -> Parallel.decide firstEnd these
-        (AsPair, [a, b]) -> 1 <$ both a b
-        (AsRace, [a, b]) -> firstNumber <$ parallel a b
-        _ -> Parallel.firstOf these
-      firstNumber = maybe 0 fst (listToMaybe runners)
       failures = filter ((== Fails) . snd) runners
       expected = case composition of
         _ | composition `elem` [AsAll, AsPair] -> case failures of
           (k, _) : _ -> FailedWith (failureOf k)
-          [] -> Gave (sum (map fst runners))
+          [] -> gave (sum (map fst runners))
         _ -> case runners of
           (k, Fails) : _ -> FailedWith (failureOf k)
-          _ -> Gave firstNumber
-  end <- run stage whole
+          _ -> gave (maybe 0 fst (listToMaybe runners))
+  end <- run stage (composed composition these)
   unless (end `elem` expected : overtaken) $
     broken ("it ended: " ++ show end ++ ", and not: " ++ show expected)
  where
   failureOf k = "Failure " ++ show (show k)
+  gave result = Gave (if composition `elem` [AsPair, AsRace] then 0 else result)
   -- In a simulation, waiting for the end of a thread throws an exception to it ('untilOver').
   -- A branch that succeeds can still receive that before its end.
   overtaken = [CancelledBy (show (Cancel "untilOver")) | any ((== Succeeds) . snd) runners]

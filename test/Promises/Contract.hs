@@ -1,10 +1,10 @@
 {-# LANGUAGE LambdaCase #-}
 
 -- |
--- The contract that every operator satisfies, anywhere in a tree: what it may do, given
--- what its branches did.
+-- The contract that every operator satisfies, anywhere in a program: what it may do, given
+-- what its parts did.
 --
--- Each branch records how it ended. In reality a stop request may still arrive between
+-- Each part records how it ended. In reality a stop request may still arrive between
 -- this record and the end of the thread, if the branch has returned. It cannot arrive if
 -- the branch has thrown, nor if it has received one before, since no branch receives two.
 -- So a branch has certainly completed only if it did so despite a stop request.
@@ -14,23 +14,24 @@ module Promises.Contract
   ) where
 
 import Control.Concurrent (ThreadId, myThreadId)
-import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar, writeTVar)
+import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar, readTVarIO, writeTVar)
 import Control.Exception
-import Control.Monad (unless, void, when)
+import Control.Monad (mfilter, replicateM_, unless, void, when)
+import Data.Foldable (for_, toList)
 import Data.IORef
-import Data.List (intercalate, sortOn)
+import Data.List (intercalate, isInfixOf, sortOn)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
-import Data.Maybe (isNothing)
+import Data.Maybe (isJust, isNothing)
 
-import Behavior (Behavior, BehaviorFailed, attempt, both, failWith, fallback, parallel)
-import Behavior.Internal.Seam.Runtime (Label (..), atomically, liveThreadCount)
-import qualified Behavior.Parallel as Parallel
-import Behavior.Signal (Signal, watching)
-import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior (Behavior, failWith)
+import Behavior.Internal.Seam.Runtime (Label, atomically, liveThreadCount)
+import Behavior.Message (withInbox)
+import Behavior.Signal (polling, watching)
+import Language.Operator hiding (run, tick)
+import qualified Language.Operator as Language
+import Promises.Program
 import Promises.Stage hiding (ending)
-import Promises.Tree
 import Support (Ending (..), ThreadEvent (..), endingOf, hang, watchingThreads)
 
 -- | The clauses of the contract.
@@ -40,27 +41,34 @@ data Clause = Structure | Exclusion | Work | FaultOut | Masking | Outcomes | Lab
 -- | The state of a test while its program runs.
 data Context = Context
   { stage :: Stage
-  , input :: TVar Int
+  , world :: TVar (Maybe World)
+  -- ^ None when it is over.
   , recordedViolations :: Log (Clause, String)
   , threadLabels :: IORef (Map ThreadId Label)
   }
 
 -- | Runs the program, and checks that no operator in it violated the clause.
 satisfies :: Clause -> Stage -> Program -> IO ()
-satisfies clause place (Program tree stimuli state) = do
-  context <- Context place <$> newTVarIO 0 <*> newLog <*> newIORef Map.empty
-  let caller = do
+satisfies clause place (Program part stimuli state) = do
+  context <- Context place <$> newTVarIO (Just 0) <*> newLog <*> newIORef Map.empty
+  driver <- newIORef (\() -> pure ())
+  let caller box = do
         before <- liveThreadCount
-        end <- try (inState state (toBehavior context tree))
+        end <- try (inState state (behavior context (environmentWith box) part))
         after <- liveThreadCount
         unless (before == after) $
           recordViolation context Structure (show (after - before) ++ " threads were left running")
         case end of
-          Left e | cancelledBy (endingOf (end :: Either SomeException Int)) -> throwIO e
+          Left e | cancelledBy (endingOf (end :: Either SomeException Result)) -> throwIO e
           -- A caller that is to be cancelled waits for that. If its cancellation was lost, it
           -- waits for ever.
           _ -> if any (stopsCaller . snd) stimuli then hang else either throwIO pure end
-      whole = calling place (atomically . writeTVar (input context)) stimuli caller
+      change = \case
+        Becomes n -> atomically (writeTVar (world context) (Just n))
+        Delivers -> readIORef driver >>= ($ ())
+        Over -> atomically (writeTVar (world context) Nothing) >> replicateM_ room (change Delivers)
+      whole =
+        withInbox room (\delivers -> pure () <$ writeIORef driver delivers) (calling place change stimuli . caller)
   end <- run place (if clause == Labels then watchingThreads (labelling context) whole else whole)
   case end of
     Gave outcome
@@ -80,6 +88,8 @@ satisfies clause place (Program tree stimuli state) = do
     Started label ->
       myThreadId >>= \self -> atomicModifyIORef' (threadLabels context) (\m -> (Map.insert self label m, ()))
     _ -> pure ()
+  -- More than there are parts that wait for a message.
+  room = 20
 
 cancelledBy :: Ending a -> Bool
 cancelledBy = \case
@@ -88,160 +98,171 @@ cancelledBy = \case
   FaultedWith f -> f == show Outside
   _ -> False
 
--- | The observations of one run of an operator.
+-- | The numbers of the leaves whose results it consists of; negated if one completed despite a stop request.
+type Result = [Int]
+
+-- | One run of an operator, and its observations.
 data Observed = Observed
-  { running :: IORef Int
-  , entries :: IORef [(Int, Entry)]
-  -- ^ The branches, the one that started last first, with the order of their starts.
+  { operator :: Operator Sensing ()
+  , callerState :: MaskingState
+  , running :: IORef Int
+  , entries :: IORef [Entry]
+  -- ^ The parts that have started, the newest first.
   }
 
--- | A branch: its position from left to right, and how it ended, if it has.
-data Entry = Entry Int (Maybe (Ending Int))
+-- | A part: the label of its branch, if it has a thread of its own, and how it ended, if it has.
+data Entry = Entry (Maybe String) (Maybe (Ending Result))
 
-data Kind = Concurrent | Reactive
-  deriving (Eq)
+-- | Where a part runs: for which operator, and in which branch.
+data Position = Position Observed (Maybe String)
 
-toBehavior :: Context -> Tree -> Behavior Int
-toBehavior t = \case
-  Leaf act -> perform (stage t) (pure ()) (recordViolation t Structure "a cleanup was interrupted") act
-  Fallback a b -> do
-    state <- getMaskingState
-    fallback (toBehavior t a) $ do
-      inside <- getMaskingState
-      unless (inside == state) $ recordViolation t Masking ("the second of ? runs " ++ show inside)
-      toBehavior t b
-  Attempt n a -> attempt n (toBehavior t a)
-  Parallel a b -> observed t "parallel" Concurrent [] $ \branch ->
-    0 <$ parallel (branch 1 "left" a) (branch 2 "right" b)
-  Both a b -> observed t "both" Concurrent [] $ \branch ->
-    0 <$ both (branch 1 "left" a) (branch 2 "right" b)
-  FirstOf as -> observed t "firstOf" Concurrent [] $ \branch ->
-    Parallel.firstOf [branch n (show n) a | (n, a) <- zip [1 ..] as]
-  AllOf as -> observed t "allOf" Concurrent [] $ \branch -> do
-    results <- Parallel.allOf [abs <$> branch n (show n) a | (n, a) <- zip [1 ..] as]
-    let expected = map valueOf as
-    unless (and (zipWith agree expected results) && length results == length as) $
-      recordViolation t Outcomes ("allOf gave " ++ show results)
-    pure 0
-  Decide m as -> observed t "decide" Concurrent ["too few have succeeded"] $ \branch -> do
-    live <- newIORef (0 :: Int)
-    let counted = bracket_ (count 1) (count (-1))
-        count k = atomicModifyIORef' live (\n -> (n + k, ()))
-        chosen = do
-          n <- readIORef live
-          unless (n == 0) $
-            recordViolation t Structure ("what decide has chosen runs, but " ++ show n ++ " branches have not ended")
-    Parallel.decide (atLeast m chosen) [counted (branch n (show n) a) | (n, a) <- zip [1 ..] as]
-  Beside as b -> observed t "scoped" Concurrent [] $ \branch ->
-    beside [void (branch n "fork" a) | (n, a) <- zip [2 ..] as] (branch 1 "body" b)
-  Select sensing a b -> observed t "rSelect" Reactive [] $ \branch ->
-    Signal.rSelect (odd <$> inputBy sensing) (branch 0 "left" a) (branch 0 "right" b)
-  Monitor sensing a b -> observed t "monitor" Reactive [] $ \branch ->
-    Signal.monitor ((== 2) <$> inputBy sensing) (branch 0 "recovery" a >> clear) (branch 0 "task" b)
-  WhileHolding sensing a -> observed t "whileHolding" Reactive ["the condition does not hold"] $ \branch ->
-    Signal.whileHolding ((/= 3) <$> inputBy sensing) (branch 0 "branch" a)
-  Timeout n a -> observed t "timeout" Reactive ["TimedOut"] $ \branch ->
-    timeout (fromIntegral n * tick (stage t)) (branch 0 "branch" a)
+-- | Runs the part of a program.
+behavior :: Context -> Environment Position Result -> Part -> Behavior Result
+behavior t around = \case
+  Leaf act -> pure <$> perform (stage t) (pure ()) (recordViolation t Structure "a cleanup was interrupted") act
+  Calm -> [] <$ atomically (modifyTVar' (world t) (calm <$))
+  Op o -> observed t o (\position -> Language.run (language t) around position position o)
+
+-- | The library's operators, with each part observed.
+language :: Context -> Language Position Sensing Part Result
+language t =
+  Language
+    { runPart = \around position -> observedPart t position . behavior t around
+    , inBranch = \label (Position o _) -> Position o (Just label)
+    , signalOf = \around position -> \case
+        Watched levels -> levelIn levels <$> watching reading
+        Polled n levels ->
+          levelIn levels <$> polling (fromIntegral n * tick (stage t)) (judgeLabel t position >> atomically reading)
+        Shared -> nearest around
+    , reactsTo = id
+    , Language.tick = tick (stage t)
+    , results = maybe [] concat
+    }
  where
-  inputBy :: Sensing -> Signal Int
-  inputBy Watched = watching (readTVar (input t))
-  inputBy (Polled n) = Signal.polling (fromIntegral n * tick (stage t)) (atomically (readTVar (input t)))
-  -- A recovery that did not remove its own cause would repeat for ever.
-  clear = atomically (modifyTVar' (input t) (\w -> if w == 2 then 1 else w))
-  valueOf = \case
-    Leaf act -> Just (number act)
-    _ -> Nothing
-  agree expected result = maybe True (== result) expected
+  reading = readTVar (world t) >>= maybe (failWith sawNothing) pure . mfilter (/= blind)
+  levelIn levels n = (levels ++ [0]) !! n
 
--- | The first result when that many have succeeded.
-atLeast :: Int -> Behavior () -> [Maybe (Either BehaviorFailed Int)] -> Maybe (Behavior Int)
-atLeast m chosen outcomes
-  | length results >= m = Just (head results <$ chosen)
-  | length results + length (filter isNothing outcomes) < m = Just (chosen >> failWith "too few have succeeded")
-  | otherwise = Nothing
- where
-  results = [n | Just (Right n) <- outcomes]
+-- | Why signals fail in a blind world, and parts when all is over.
+sawNothing :: String
+sawNothing = "nothing is seen"
 
 recordViolation :: Context -> Clause -> String -> IO ()
 recordViolation t clause = append (recordedViolations t) . (,) clause
 
--- | Observes one run of an operator, whose branches are made by the function that the last
--- argument receives, and records the violations at its end. The texts are those of the
--- operator's own failures.
-observed
-  :: Context -> String -> Kind -> [String] -> ((Int -> String -> Tree -> Behavior Int) -> Behavior Int) -> Behavior Int
-observed t operator kind ownFailures body = mask $ \restore -> do
-  o <- Observed <$> newIORef 0 <*> newIORef []
-  end <- try (restore (body (branching t operator kind o)))
-  n <- readIORef (running o)
-  unless (n == 0) $
-    recordViolation t Structure (operator ++ " has ended, but " ++ show n ++ " of its branches have not")
-  started <- reverse . map snd <$> readIORef (entries o)
-  contract t operator kind ownFailures (endingOf end) started
-  either (\e -> throwIO (e :: SomeException)) (pure . abs) end
-
--- | An observed branch.
-branching :: Context -> String -> Kind -> Observed -> Int -> String -> Tree -> Behavior Int
-branching t operator kind o place name tree = do
+-- | Observes one run of the operator, which gets its position, and records the violations at its end.
+observed :: Context -> Operator Sensing Part -> (Position -> Behavior Result) -> Behavior Result
+observed t o body = do
   state <- getMaskingState
   mask $ \restore -> do
-    unless (state == Unmasked) $ recordViolation t Masking (expected ++ " runs " ++ show state)
-    self <- Map.lookup <$> myThreadId <*> readIORef (threadLabels t)
-    unless (self == Just (Label operator name)) $
-      recordViolation t Labels (expected ++ " runs in a thread that is labelled " ++ show self)
-    others <- atomicModifyIORef' (running o) (\n -> (n + 1, n))
-    when (kind == Reactive && others > 0) $
-      recordViolation t Exclusion (expected ++ " started although another branch runs")
-    before <- readIORef (entries o)
-    when (kind == Reactive && any (completedDespiteStop . snd) before) $
-      recordViolation t Work (expected ++ " started although a branch had completed")
-    key <- atomicModifyIORef' (entries o) (\es -> ((length es, Entry place Nothing) : es, length es))
-    end <- try (restore (toBehavior t tree))
-    let ended' = Entry place (Just (endingOf end))
-    atomicModifyIORef' (entries o) (\es -> ([(k, if k == key then ended' else e) | (k, e) <- es], ()))
-    atomicModifyIORef' (running o) (\n -> (n - 1, ()))
+    this <- Observed (void o) state <$> newIORef 0 <*> newIORef []
+    end <- try (restore (body (Position this Nothing)))
+    n <- readIORef (running this)
+    unless (n == 0) $
+      recordViolation t Structure (nameOf o ++ " has ended, but " ++ show n ++ " of its branches have not")
+    readIORef (entries this) >>= contract t (operator this) (endingOf end) . reverse
+    either (\e -> throwIO (e :: SomeException)) (pure . withoutSign) end
+ where
+  -- A stop request that another thread received was not this one's.
+  withoutSign = if isJust (operatorName o) || forks o then map abs else id
+
+-- | Observes a part of an operator.
+observedPart :: Context -> Position -> Behavior Result -> Behavior Result
+observedPart t position@(Position this branch) act = do
+  state <- getMaskingState
+  mask $ \restore -> do
+    unless (state == maybe (callerState this) (const Unmasked) branch) $
+      recordViolation t Masking (name ++ " runs " ++ show state)
+    judgeLabel t position
+    others <- atomicModifyIORef' (running this) (\n -> (n + 1, n))
+    before <- readIORef (entries this)
+    case branch of
+      Nothing -> when (others > 0) $ recordViolation t Structure (name ++ " runs beside its branches")
+      Just _ -> unless (atOnce (operator this)) $ do
+        when (others > 0) $ recordViolation t Exclusion (name ++ " started although another branch runs")
+        when (any completedDespiteStop before) $
+          recordViolation t Work (name ++ " started although a branch had completed")
+    key <- atomicModifyIORef' (entries this) (\es -> (Entry branch Nothing : es, length es))
+    isOver <- isNothing <$> readTVarIO (world t)
+    end <- try (restore (if isOver then failWith sawNothing else act))
+    let ended' = Entry branch (Just (endingOf end))
+    atomicModifyIORef' (entries this) $ \es ->
+      let (newer, older) = splitAt (length es - key - 1) es in (newer ++ ended' : drop 1 older, ())
+    atomicModifyIORef' (running this) (\n -> (n - 1, ()))
     either (\e -> throwIO (e :: SomeException)) pure end
  where
-  expected = show (Label operator name)
+  name = nameOfPart position
+
+-- | Records a violation if the thread does not have the label of the branch.
+judgeLabel :: Context -> Position -> Behavior ()
+judgeLabel t position@(Position _ branch) = for_ branch $ \expected -> do
+  self <- Map.lookup <$> myThreadId <*> readIORef (threadLabels t)
+  unless (fmap show self == Just expected) $
+    recordViolation t Labels (nameOfPart position ++ " runs in a thread that is labelled " ++ show self)
+
+nameOf :: Show s => Operator s p -> String
+nameOf = show . void
+
+nameOfPart :: Position -> String
+nameOfPart (Position this branch) = maybe ("a part of " ++ nameOf (operator this)) show branch
 
 -- | Whether the branch has completed despite a stop request.
 completedDespiteStop :: Entry -> Bool
 completedDespiteStop (Entry _ end) = case end of
-  Just (Gave n) -> n < 0
+  Just (Gave ns) -> any (< 0) ns
   _ -> False
 
--- | Records a violation if the operator may not end like this, given how its branches ended.
-contract :: Context -> String -> Kind -> [String] -> Ending Int -> [Entry] -> IO ()
-contract t operator kind ownFailures end started = do
-  case faults of
-    leftmost : _ -> case end of
-      FaultedWith f | f == leftmost -> pure ()
-      CancelledWithFault _ f | f == leftmost -> pure ()
-      _ -> wrong FaultOut ("the leftmost fault of its branches is " ++ leftmost)
-    [] -> case end of
-      FaultedWith f | f /= show Outside -> wrong Outcomes "no branch faulted"
-      CancelledWithFault _ _ -> wrong Outcomes "no branch faulted"
-      _ -> pure ()
+-- | Records a violation if the operator may not end like this, given how its parts ended, in the order of their
+-- starts.
+contract :: Context -> Operator Sensing () -> Ending Result -> [Entry] -> IO ()
+contract t o end started = do
+  case (faults, faultOf end) of
+    ([], [f]) | f /= show Outside, not (isOwn f) -> wrong Outcomes "no part faulted"
+    ([], _) -> pure ()
+    ((first, leftmost) : _, fs) ->
+      unless (any (`elem` [f | (place, f) <- faults, place == first]) fs) $
+        wrong FaultOut ("the leftmost fault of its parts is " ++ leftmost)
   case end of
-    Gave n
-      | n /= 0, n `notElem` results, negate n `notElem` results -> wrong Outcomes "no branch returned that"
-    FailedWith why
-      | why `notElem` failures, not (any (`begins` why) ownFailures) -> wrong Outcomes "no branch failed like that"
+    Gave ns | not (fits ns) -> wrong Outcomes ("its parts returned " ++ show given)
+    FailedWith why | why `notElem` failures, not (isOwn why) -> wrong Outcomes "no part failed like that"
     _ -> pure ()
-  when (operator == "both" && gave && length results /= 2) $ wrong Outcomes "not both have completed"
-  case [n | kind == Reactive, Gave n <- outcomes, n < 0] of
-    n : _
-      | null faults, not (cancelledBy end), not (gave && valueIs n) ->
-          wrong Work ("a branch completed with " ++ show (abs n))
+  case [ns | not (atOnce o), (_, entry@(Entry (Just _) (Just (Gave ns)))) <- inOrder, completedDespiteStop entry] of
+    ns : _
+      | null faults, not (cancelledBy end), not (gaveThat ns) -> wrong Work ("a branch completed with " ++ show ns)
     _ -> pure ()
  where
-  wrong clause why = recordViolation t clause (operator ++ " ended: " ++ show end ++ ", but " ++ why)
-  outcomes = [e | Entry _ (Just e) <- inOrder]
-  -- Branches at the same position have started one after the other.
-  inOrder = sortOn (\(Entry place _) -> place) started
-  faults = concatMap (\case FaultedWith f -> [f]; CancelledWithFault _ f -> [f]; _ -> []) outcomes
-  results = [n | Gave n <- outcomes]
-  failures = [why | FailedWith why <- outcomes]
-  gave = case end of Gave _ -> True; _ -> False
-  valueIs n = case end of Gave m -> abs m == abs n; _ -> False
-  begins prefix text = any (\k -> take (length prefix) (drop k text) == prefix) [0 .. length text]
+  wrong clause why = recordViolation t clause (nameOf o ++ " ended: " ++ show end ++ ", but " ++ why)
+  inOrder = sortOn fst (zipWith (\n entry -> (placeOf o n entry, entry)) [0 ..] started)
+  outcomes = [(place, e) | (place, Entry _ (Just e)) <- inOrder]
+  faults = [(place, f) | (place, e) <- outcomes, f <- faultOf e]
+  faultOf = \case
+    FaultedWith f -> [f]
+    CancelledWithFault _ f -> [f]
+    _ -> []
+  given = [map abs ns | (_, Gave ns) <- outcomes]
+  failures = [why | (_, FailedWith why) <- outcomes]
+  gaveThat ns = case end of Gave ms -> map abs ms == map abs ns; _ -> False
+  fits ns = case o of
+    AllOf as -> length given == length as && map abs ns == concat given
+    Both _ _ -> null ns && length given == 2
+    _ -> null ns || map abs ns `elem` given || isAwaited
+  isOwn text = isAwaited || any (`isInfixOf` text) (sawNothing : ownErrors o)
+  -- What a child gives is an outcome of its scope's part.
+  isAwaited = forks o
+
+-- | The place of the part that started as the n-th: from left to right. (Labels are in this order, and what does not
+-- run in a branch runs when these have ended. Which of two was forked first is not known.)
+placeOf :: Operator s p -> Int -> Entry -> (Int, String)
+placeOf o n (Entry branch _)
+  | atOnce o = maybe (1, "") ((,) 0) branch
+  | otherwise = (n, "")
+
+-- | In the texts of the errors that an operator throws itself.
+ownErrors :: Operator s p -> [String]
+ownErrors o = case o of
+  Decide {} -> ["too few have succeeded", "decide: all behaviours have ended"]
+  WhileHolding _ _ -> ["the condition does not hold"]
+  Timeout _ _ -> ["TimedOut"]
+  Attempt n _ | n <= 0 -> ["Failed"]
+  FallbackOver _ | null (toList o) -> ["Failed"]
+  FirstOf [] -> ["Failed"]
+  _ -> []

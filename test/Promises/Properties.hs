@@ -22,9 +22,9 @@ module Promises.Properties
 
 import Promises.Concurrent
 import Promises.Contract
+import Promises.Program
 import Promises.Reactive
 import Promises.Stage
-import Promises.Tree
 
 -- | All of them.
 promises :: [Promise]

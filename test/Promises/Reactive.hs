@@ -34,6 +34,8 @@ import qualified Behavior.Signal as Signal
 import Behavior.Time (now)
 import Promises.Stage
 import Support (Ending (..), Fault (..), hang)
+import Watched (Operator (..), operators)
+import qualified Watched
 
 -- | Waits until the variable has a wanted value.
 untilIs :: TVar a -> (a -> Bool) -> Behavior ()
@@ -44,9 +46,6 @@ untilIs var wanted = atomically (readTVar var >>= STM.check . wanted)
 -- | A sensor that dies while the operator runs, or before its first value.
 data SensorFailure = SensorFailure Operator Sensor SensorError Bool Act
   deriving (Show)
-
-data Operator = Selecting Bool | Monitoring | Holding
-  deriving (Eq, Show)
 
 data Sensor = WatchedSensor | PolledSensor Int
   deriving (Eq, Show)
@@ -62,22 +61,21 @@ sensorFailures size = do
       else frequency [(1, pure WatchedSensor), (2, PolledSensor <$> choose (1, 2))]
   fromTheStart <- frequency [(4, pure False), (1, pure True)]
   cause <- elements ([Failing, Faulting] ++ [LosingValue | sensor == WatchedSensor, not fromTheStart])
-  operator <- elements [Selecting False, Selecting True, Monitoring, Holding]
+  op <- elements operators
   act <- acts 7
-  pure (SensorFailure operator sensor cause fromTheStart act)
+  pure (SensorFailure op sensor cause fromTheStart act)
 
 -- | The branch is stopped, no other branch starts, and the operator throws what the sensor
 -- threw, unless the branch ends otherwise than by stopping.
 notTakenForFalse :: Stage -> SensorFailure -> IO ()
-notTakenForFalse stage (SensorFailure operator sensor cause fromTheStart act) = do
+notTakenForFalse stage (SensorFailure op sensor cause fromTheStart act) = do
   dead <- newTVarIO fromTheStart
   inside <- newTVarIO False
   others <- newLog
-  let value = operator `elem` [Selecting True, Holding]
-      reading :: STM Bool
+  let reading :: STM Bool
       reading =
         readTVar dead >>= \case
-          False -> pure value
+          False -> pure True
           True -> case cause of
             Failing -> failWith "the sensor"
             Faulting -> throwSTM (Fault "the sensor")
@@ -88,12 +86,7 @@ notTakenForFalse stage (SensorFailure operator sensor cause fromTheStart act) = 
       branch =
         perform stage (atomically (writeTVar inside True)) (pure ()) act
           {takes = untilStopped, uninterruptible = False}
-      other = 0 <$ append others ()
-      operating = case operator of
-        Selecting True -> Signal.rSelect signal branch other
-        Selecting False -> Signal.rSelect signal other branch
-        Monitoring -> Signal.monitor signal (append others ()) branch
-        Holding -> Signal.whileHolding signal branch
+      operating = running op signal (show <$> branch) ("" <$ append others ())
       stimuli = [(0, Changes ()) | not fromTheStart]
   end <- run stage (calling stage (\() -> untilIs inside id >> atomically (writeTVar dead True)) stimuli operating)
   started <- readLog others
@@ -102,7 +95,7 @@ notTakenForFalse stage (SensorFailure operator sensor cause fromTheStart act) = 
         | fromTheStart = sensors
         | otherwise = case stopResponse act of
             Stops -> sensors
-            Completes -> Gave (negate (number act))
+            Completes -> Gave (show (negate (number act)))
             FailsToStop -> FailedWith ("Failure " ++ show (show (number act)))
             FaultsInCleanup -> FaultedWith (show (Fault ("the cleanup of " ++ show (number act))))
       sensors = case cause of
@@ -124,28 +117,27 @@ data Script = Script Operator Int [Bool]
 scripts :: Size -> Gen Script
 scripts size =
   Script
-    <$> elements [Selecting True, Monitoring, Holding]
+    <$> elements operators
     <*> choose (1, 3)
     <*> (choose (0, if size == Tiny then 2 else 6) >>= \n -> vectorOf n (elements [False, True]))
 
 -- | Readings start at least a period apart, rereads and those after a recovery included.
 aPeriodApart :: Stage -> Script -> IO ()
-aPeriodApart stage (Script operator every values) = do
+aPeriodApart stage (Script op every values) = do
   started <- newTVarIO (0 :: Int)
   begun <- newLog
   let apart = fromIntegral every * tick stage
       reading = do
         now >>= append begun
         k <- atomically (modifyTVar' started (+ 1) >> readTVar started)
-        pure (and (take 1 (drop (k - 1) values)) && k <= length values)
-      branch = untilIs started (> length values + 1)
+        pure (or (take 1 (drop (k - 1) values)))
+      branch = "" <$ untilIs started (> length values + 1)
       signal = Signal.polling apart reading
   end <- run stage $ do
     t <- now
-    (,) t <$> calling stage pure [] (case operator of
-      Monitoring -> Signal.monitor signal (pure ()) branch
-      Selecting _ -> Signal.rSelect signal branch branch
-      Holding -> Signal.whileHolding (not <$> signal) branch)
+    -- (What is latched ends at once: no reading would end it.)
+    let other = if Watched.latched op then pure "" else branch
+    (,) t <$> calling stage pure [] (running op (not <$> signal) branch other)
   case end of
     Gave (t, ended) -> do
       moments <- readLog begun
@@ -157,8 +149,8 @@ aPeriodApart stage (Script operator every values) = do
                 ++ " after the start, and the period is " ++ show apart
             )
       case ended of
-        Gave () -> pure ()
-        FailedWith _ | operator == Holding, or values -> pure ()
+        Gave _ -> pure ()
+        FailedWith _ | operator op == "whileHolding", or values -> pure ()
         _ -> broken ("it ended: " ++ show ended)
     _ -> broken ("it ended: " ++ show end)
 

@@ -27,7 +27,6 @@ module Promises.Stage
   , End (..)
   , StopResponse (..)
   , perform
-  , beside
   , finish
   , acts
   , ends
@@ -42,7 +41,7 @@ module Promises.Stage
 
 import Control.Concurrent (ThreadId)
 import Control.Exception
-import Data.Foldable (for_, traverse_)
+import Data.Foldable (for_)
 import Data.IORef
 import Test.QuickCheck (Gen, choose, elements, frequency)
 import Test.QuickCheck.Gen (unGen)
@@ -59,7 +58,6 @@ import Behavior.Internal.Seam.Runtime
   , start
   , threadEnd
   )
-import Behavior.Parallel (fork, scoped)
 import Support (Cancel (..), Ending, Failure (..), Fault (..), endingOf)
 
 -- | A promise of the library: random programs, and a test whether one run of one of them
@@ -189,10 +187,6 @@ perform stage begun cleanupInterrupted act = work `catch` stopping
           FailsToStop -> finish (number act) Fails
           FaultsInCleanup -> throwIO (Fault ("the cleanup of " ++ show (number act)))
     | otherwise = throwIO e
-
--- | Forks the behaviours of the list in a scope, then runs the other as its body.
-beside :: [Behavior ()] -> Behavior a -> Behavior a
-beside others body = scoped (\nursery -> traverse_ (fork nursery) others >> body)
 
 finish :: Int -> End -> Behavior Int
 finish n Succeeds = pure n

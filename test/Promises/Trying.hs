@@ -59,7 +59,7 @@ seedOf text i = i + 1000003 * foldl' (\n c -> (31 * n + fromEnum c) `mod` 100000
 
 -- | How many schedules are tried of each random program.
 perProgram :: Int
-perProgram = 20
+perProgram = 10
 
 -- | Tests all schedules of small programs. The arguments are the number of the first program,
 -- the greatest number of pre-emptions, the greatest number of schedules that a program may
