@@ -31,7 +31,10 @@ written = writtenExcept ""
 -- | The same, except that these characters are written as they are.
 writtenExcept :: [Char] -> Encoding -> Builder
 writtenExcept plain encoding
-  | Lazy.any unsafe characters = lazyByteString (Lazy.encodeUtf8 (Lazy.concatMap escaped characters))
+  -- (Most are of ASCII only, whose bytes are the characters.)
+  | Bytes.any (\c -> c >= '\DEL' || unsafe c) bytes
+  , Lazy.any unsafe characters =
+      lazyByteString (Lazy.encodeUtf8 (Lazy.concatMap escaped characters))
   | otherwise = lazyByteString bytes
  where
   bytes = encodingToLazyByteString encoding
