@@ -100,6 +100,22 @@ rareWorlds =
       }
   , -- Child and body fault at the same time.
     alone (Scoped (Fork (act 1 "a" Faults StopsAtOnce) `Then` act 1 "b" Faults StopsAtOnce))
+  , -- The handler of a message completes despite the stop request of a rule before it; another message has come.
+    ( alone
+        ( Deliver
+            `Then` Both
+              (act 1 "d" (Succeeds 0) StopsAtOnce `Then` Deliver)
+              ( MessageRule
+                  (Watched "p")
+                  (act 9 "f" Fails StopsAtOnce)
+                  (act 2 "h" (Succeeds 0) (EndsAfter 1 (Succeeds 0)))
+                  (Watched "q")
+                  (act 1 "t" (Succeeds 7) StopsAtOnce)
+              )
+        )
+    )
+      { changes = [Change 1 "p" (At 1), Change 3 "p" (At 0), Change 4 "q" (At 1)]
+      }
   , -- Two children are forked at the same time, and fail at the same time.
     alone . Scoped $
       Both (Fork (act 1 "a" Fails StopsAtOnce)) (Fork (act 1 "b" Fails StopsAtOnce)) `Then` WaitUntil (Watched "p")
@@ -450,6 +466,18 @@ relation = do
     it "whose handler does not succeed are handled again" $
       (Deliver `Then` (Timeout 1 (HandleNext (act "h" 2 (Succeeds 7))) `Else` HandleNext (act "h" 2 (Succeeds 8))))
         `endsIn` [Gave 3 (Succeeded (Number 8))]
+    it "as one of ordered rules are handled again when a rule before them interrupts that; a rule after them waits" $
+      with
+        [Change 1 "p" (At 1), Change 2 "p" (At 0), Change 3 "q" (At 1)]
+        ( Deliver
+            `Then` MessageRule
+              (Watched "p")
+              (act "f" 9 (Succeeds 1))
+              (act "h" 2 (Succeeds 0))
+              (Watched "q")
+              (act "t" 1 (Succeeds 7))
+        )
+        `endsWith` [Gave 5 (Succeeded (Number 7))]
     it "are dropped, the oldest first, when there is no room" $
       foldr Then (WaitUntil (Watched "p")) (replicate 3 Deliver ++ replicate 3 (HandleNext (act "h" 1 (Succeeds 7))))
         `endsIn` [Gave 100 (Succeeded timeIsUp)]

@@ -50,7 +50,7 @@ import Data.Maybe (catMaybes, fromMaybe, isNothing)
 import Test.QuickCheck (Gen, choose, frequency, suchThat, vectorOf)
 
 import Behavior
-import Behavior.Message (Inbox, handleNext, onMessage)
+import Behavior.Message (Inbox, handleNext, messageRule, onMessage)
 import Behavior.Parallel (Child, allOf, await, decide, firstOf, fork, requestStop, scoped)
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal)
@@ -93,6 +93,8 @@ data Operator s p
     OnMessage p p
   | -- | Waits for a message.
     HandleNext p
+  | -- | Three ordered rules: the second has each message handled.
+    MessageRule s p p s p
   | -- | The part may follow the signal, as the shared one.
     WithShared s p
   | Scoped p
@@ -140,6 +142,7 @@ traverseBoth signal part = \case
   Abandoning n a -> Abandoning n <$> part a
   OnMessage a b -> OnMessage <$> part a <*> part b
   HandleNext a -> HandleNext <$> part a
+  MessageRule r a b s c -> MessageRule <$> signal r <*> part a <*> part b <*> signal s <*> part c
   WithShared s a -> WithShared <$> signal s <*> part a
   Scoped a -> Scoped <$> part a
   Fork a -> Fork <$> part a
@@ -165,6 +168,7 @@ operatorName = \case
   CleanupWithin _ _ -> Just "cleanupWithin"
   Abandoning _ _ -> Just "abandoning"
   OnMessage _ _ -> Just "onMessage"
+  MessageRule {} -> Just "teleoReactive"
   WithShared _ _ -> Just "withShared"
   Scoped _ -> Just "scoped"
   _ -> Nothing
@@ -188,6 +192,7 @@ receives :: Operator s p -> Bool
 receives = \case
   OnMessage _ _ -> True
   HandleNext _ -> True
+  MessageRule {} -> True
   _ -> False
 
 -- | Whether all its branches run at once. (Those of the others run one after the other.)
@@ -257,6 +262,7 @@ shapes around =
     , (2, (`Abandoning` ()) <$> choose (0, 3))
     , (2, pure (OnMessage () ()))
     , (1, pure (HandleNext ()))
+    , (2, pure (MessageRule () () () () ()))
     , (2, pure (WithShared () ()))
     , (2, pure (Scoped ()))
     ]
@@ -379,6 +385,10 @@ run language around outer own o = case o of
   Abandoning n a -> abandoning (ticks n) (branch "branch" a)
   OnMessage a b -> onMessage (inbox around) (\() -> pure () <$ branch "handler" a) (branch "task" b)
   HandleNext a -> handleNext (inbox around) (\() -> pure <$> inPlace a)
+  MessageRule r a b s c -> do
+    let handler = runPart language around (inBranch language "messageRule: handler" (labelled "rule 2")) b
+    rule <- messageRule (inbox around) (\() -> pure () <$ handler)
+    Signal.teleoReactive [(condition r, branch "rule 1" a), rule, (condition s, branch "rule 3" c)]
   WithShared s a -> Signal.withShared (opened s) (\signal -> branchIn around {nearest = signal} "body" a)
   Scoped a -> scoped $ \nursery ->
     branchIn around {forking = \forked -> fork nursery (forked (labelled "fork"))} "body" a

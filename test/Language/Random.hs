@@ -35,6 +35,7 @@ programs wanted = go O.outside
   inTime = \case
     O.Monitor s recovery task -> (\a -> O.Monitor s (takingTime a `Then` recovery) task) <$> script
     O.OnMessage handler task -> (\a -> O.OnMessage (takingTime a `Then` handler) task) <$> script
+    O.MessageRule r p handler s q -> (\a -> O.MessageRule r p (takingTime a `Then` handler) s q) <$> script
     o -> pure o
   takingTime s = Do "a" [s {takes = max 1 (takes s)}]
   signal around n =
@@ -134,6 +135,7 @@ isWellFormed = go O.outside
   takesTime = \case
     O.Monitor _ recovery _ -> beginsLong recovery
     O.OnMessage handler _ -> beginsLong handler
+    O.MessageRule _ _ handler _ _ -> beginsLong handler
     _ -> True
   beginsLong = \case
     Do _ scripts -> all ((> 0) . takes) scripts

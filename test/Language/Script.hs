@@ -15,7 +15,7 @@ module Language.Script
       ( ..
       , Then, Else, Attempt, FallbackOver, Parallel, Both, FirstOf, AllOf
       , Decide, RSelect, Monitor, InsteadWhen, Switch, TeleoReactive, WaitUntil, WhileHolding
-      , Timeout, CleanupWithin, Abandoning, Retrying, Every, OnMessage, HandleNext
+      , Timeout, CleanupWithin, Abandoning, Retrying, Every, OnMessage, HandleNext, MessageRule
       , WithShared, Scoped, Fork, Await, StopChild
       )
   , Signal
@@ -191,6 +191,9 @@ pattern Switch a b = Op (O.Switch a b)
 pattern TeleoReactive :: [(Signal, Program)] -> Program
 pattern TeleoReactive a = Op (O.TeleoReactive a)
 
+pattern MessageRule :: Signal -> Program -> Program -> Signal -> Program -> Program
+pattern MessageRule a b c d e = Op (O.MessageRule a b c d e)
+
 pattern WaitUntil :: Signal -> Program
 pattern WaitUntil a = Op (O.WaitUntil a)
 
@@ -201,7 +204,7 @@ pattern WithShared a b = Op (O.WithShared a b)
 {-# COMPLETE
   Do, Pure, Sleep, Then, Else, Attempt, FallbackOver, Retrying, Every, Parallel, Both, FirstOf, AllOf, Decide, RSelect
   , Monitor, InsteadWhen, Switch, TeleoReactive, WaitUntil, WhileHolding, Timeout, CleanupWithin, Abandoning
-  , OnMessage, HandleNext, WithShared, Scoped, Fork, Await, StopChild, Deliver
+  , OnMessage, HandleNext, MessageRule, WithShared, Scoped, Fork, Await, StopChild, Deliver
   #-}
 
 -- * The parts of a program

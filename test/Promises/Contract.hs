@@ -205,10 +205,11 @@ nameOf = show . void
 nameOfPart :: Position -> String
 nameOfPart (Position this branch) = maybe ("a part of " ++ nameOf (operator this)) show branch
 
--- | Whether the branch has completed despite a stop request.
+-- | Whether the branch has completed despite a stop request. (A handler that has does not keep its rule from being
+-- stopped.)
 completedDespiteStop :: Entry -> Bool
-completedDespiteStop (Entry _ end) = case end of
-  Just (Gave ns) -> any (< 0) ns
+completedDespiteStop (Entry branch end) = case end of
+  Just (Gave ns) -> any (< 0) ns && branch /= Just "messageRule: handler"
   _ -> False
 
 -- | Records a violation if the operator may not end like this, given how its parts ended, in the order of their

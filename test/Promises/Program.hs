@@ -130,6 +130,7 @@ threads o = length [() | Polled _ _ <- signals] + case o of
   Timeout _ _ -> 2
   CleanupWithin _ _ -> 2
   Scoped _ -> 2
+  MessageRule {} -> 2
   Decide _ as _ -> length as
   _ | isNothing (operatorName o) -> 0
     | atOnce o -> length o
@@ -142,6 +143,7 @@ waits :: Operator s p -> Bool
 waits = \case
   WaitUntil _ -> True
   TeleoReactive _ -> True
+  MessageRule {} -> True
   _ -> False
 
 -- | Gives every leaf a number of its own.

@@ -11,6 +11,7 @@ module Semantics.Begin
   , orElse
   , continued
   , inSlot
+  , serving
   , ended
   , thread
   ) where
@@ -99,6 +100,7 @@ opened t p = case p of
   WithShared signal body -> Sharing (open t signal) (thread t "withShared: body" body)
   TeleoReactive rules -> following (startSource t (Joined FirstHolding (map (unstarted . fst) rules)))
   OnMessage _ _ -> following (Watching messages)
+  MessageRule r _ _ s _ -> following (startSource t (Joined FirstHolding [unstarted r, Watching messages, unstarted s]))
   _ -> case signals p of
     signal : _ -> following (open t signal)
     [] -> error "opened: this operator has no signal"
@@ -128,6 +130,13 @@ inSlot t interval from act = \case
   Over (Succeeded _) -> AwaitingSlot interval (until (>= clock t) (+ interval) (from + interval)) act
   Over wrong -> Over wrong
   r -> InSlot interval from act r
+
+-- | The run of a rule that has each message handled by the program: after one the next is awaited.
+serving :: Program -> Running -> Running
+serving handler = \case
+  Over (Succeeded _) -> Serving handler Nothing
+  Over wrong -> Over wrong
+  r -> Serving handler (Just r)
 
 ended :: Name -> Ending -> Result
 ended name = \case

@@ -119,6 +119,8 @@ data Running
     Taking Bool Program
   | -- | What handles a message, which is put back if it does not succeed.
     Handling Running
+  | -- | The rule that has each message handled by the program; and what runs for one, if one has come.
+    Serving Program (Maybe Running)
   | -- | After this, the inbox is closed.
     Closing Running
   | -- | A thread whose stop was requested, which is awaited until the given time, and then abandoned.
@@ -280,6 +282,7 @@ dueTimes = \case
   AwaitingSlot _ due _ -> [due]
   Uninterruptibly r -> dueTimes r
   Handling r -> dueTimes r
+  Serving _ r -> maybe [] dueTimes r
   Closing r -> dueTimes r
   GivingUp due branch -> due : ofThreads [branch]
   StoppingChild _ r -> dueTimes r
@@ -316,6 +319,7 @@ afterTimePassed = \case
   InSlot interval from p r -> InSlot interval from p (afterTimePassed r)
   Uninterruptibly r -> Uninterruptibly (afterTimePassed r)
   Handling r -> Handling (afterTimePassed r)
+  Serving handler r -> Serving handler (afterTimePassed <$> r)
   Closing r -> Closing (afterTimePassed r)
   GivingUp due branch -> GivingUp due (threadAfter branch)
   StoppingChild k r -> StoppingChild k (afterTimePassed r)

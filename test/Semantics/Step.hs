@@ -95,6 +95,12 @@ steps t = \case
   Handling (Over result@(Succeeded _)) -> silently t (Over result)
   Handling (Over wrong) -> silently (withOneMore t) (Over wrong)
   Handling r -> [(l, t', Handling r') | (l, t', r') <- steps t r]
+  Serving handler Nothing -> case Map.lookup messages (levels t) of
+    Just (At n) | n > 0 -> silently t (Serving handler (Just (Waiting Race [inBranch (Taking True handler)])))
+    _ -> []
+   where
+    inBranch = Thread "messageRule: handler" . Live NotStarted . Entering
+  Serving handler (Just r) -> [(l, t', serving handler r') | (l, t', r') <- steps t r]
   Closing (Over result) -> silently t (Over result)
   Closing r -> [(l, t', Closing r') | (l, t', r') <- steps t r]
   Waiting operator threads ->
@@ -291,6 +297,7 @@ receive t = \case
     | otherwise -> []
   Handling (Over _) -> []
   Handling r -> fmap Handling <$> receive t r
+  Serving handler r -> maybe stopped (fmap (fmap (serving handler)) . receive t) r
   Closing _ -> []
   GivingUp _ _ -> []
   Waiting (Abandon most) threads ->
@@ -356,18 +363,18 @@ threadSteps t (Thread label state) = case state of
 
 reactions :: Now -> Program -> Source -> View -> Phase -> Steps Running
 reactions t p source v phase = case phase of
-  Choosing mode -> case readSource t mode v source of
+  Choosing mode -> case reading mode of
     Nothing -> []
     Just (Left wrong) -> silently t (conclude React wrong source [])
     Just (Right seen) -> react seen
-  Idling old -> case readSource t Reread v source of
+  Idling old -> case reading Reread of
     Just (Left wrong) -> silently t (conclude React wrong source [])
     Just (Right seen) | differs old seen -> react seen
     _ -> []
   Following old branch ->
     inThread (Following old) branch
       -- The end of the branch has priority over the signal.
-      ++ case (endOf branch, readSource t Reread v source) of
+      ++ case (endOf branch, reading Reread) of
         (Just result, _) -> silently t (conclude React result source [branch])
         (_, Just (Left wrong)) -> silently t (stopping (Conclude wrong) source branch)
         (_, Just (Right seen@(value, t', source')))
@@ -384,13 +391,22 @@ reactions t p source v phase = case phase of
  where
   inThread inPlace branch = [(l, t', Reacting p source v (inPlace branch')) | (l, t', branch') <- threadSteps t branch]
   differs old (value, _, _) = valueOf p value /= old
+  -- The condition of a rule for messages also holds while the rule handles one.
+  reading mode = case phase of
+    Following 1 (Thread _ (Live _ (Serving _ (Just (Waiting _ [Thread _ (Live _ (Handling _))]))))) ->
+      fmap (\(value, t', source') -> (value, t' {levels = levels t}, source'))
+        <$> readSource t {levels = Map.insert messages (At 1) (levels t)} mode v source
+    _ -> readSource t mode v source
   react (seen, t', source') = silently t' $ case response p value of
-    Run act -> Reacting p source' v (Following value (thread t' (nameOf p value) act))
+    Run act -> Reacting p source' v (Following value (started t' act))
     RunToEnd recovery -> recover Nothing (requestStopOfSource source') recovery
     Idle -> Reacting p source' v (Idling value)
     Conclude result -> conclude React result source' []
    where
     value = valueOf p seen
+    started now' act = case p of
+      MessageRule {} | value == 1 -> Thread (nameOf p value) (Live NotStarted (Serving act Nothing))
+      _ -> thread now' (nameOf p value) act
   -- The sensors keep running if the signal is read again after the branch has stopped.
   stopping next source' branch = Reacting p (keepOrStop source') v (Stopping next (requestStop branch))
    where

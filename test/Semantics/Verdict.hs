@@ -103,6 +103,7 @@ valueOf :: Program -> Int -> Int
 valueOf p value = case p of
   Switch {} -> value
   TeleoReactive _ -> value
+  MessageRule {} -> value
   _ -> fromEnum (holds value)
 
 -- | The response to the value of the signal.
@@ -114,6 +115,7 @@ response p value = case p of
   InsteadWhen _ emergency act -> if isTrue then RunToEnd emergency else Run act
   Switch _ branches -> Run (branches !! max 0 (min value (length branches - 1)))
   TeleoReactive rules -> if value < 0 then Idle else Run (snd (rules !! value))
+  MessageRule _ first handler _ third -> if value < 0 then Idle else Run ([first, handler, third] !! value)
   WaitUntil _ -> if isTrue then Conclude (Succeeded Unit) else Idle
   WhileHolding _ act -> if isTrue then Run act else Conclude (FailedWith doesNotHold)
   CleanupWithin _ act -> if isTrue then Conclude (Succeeded Unit) else Run act
@@ -131,6 +133,7 @@ nameOf p value = case p of
   OnMessage {} -> "onMessage: task"
   Switch {} -> "switch: branch"
   TeleoReactive _ -> "teleoReactive: rule " ++ show (value + 1)
+  MessageRule {} -> "teleoReactive: rule " ++ show (value + 1)
   WhileHolding {} -> "whileHolding: branch"
   CleanupWithin {} -> "cleanupWithin: branch"
   _ -> "timeout: branch"
