@@ -181,7 +181,7 @@ composed :: Composition -> [Behavior Int] -> Behavior Int
 composed composition these = case (composition, these) of
   (AsAll, _) -> sum <$> Parallel.allOf these
   -- What has ended first; on a tie the leftmost.
-  (AsDecision, _) -> Parallel.decide (\ends -> listToMaybe [either throwIO pure end | Just end <- ends]) these
+  (AsDecision, _) -> Parallel.decide (\outcomes -> listToMaybe [either throwIO pure end | Just end <- outcomes]) these
   (AsPair, [a, b]) -> 0 <$ both a b
   (AsRace, [a, b]) -> 0 <$ parallel a b
   _ -> Parallel.firstOf these

@@ -60,7 +60,9 @@ import Semantics.Program
 -- | Simulates the world's program under a schedule, and returns what was observed, or the
 -- reason why the run had no proper end.
 observed :: Schedule -> World -> IO (Either String Seen)
-observed how world = fst <$> observedWith plain how world
+observed how world = do
+  (seen, _) <- observedWith plain how world -- without the run, also before it is needed
+  pure seen
 
 -- | Likewise, with an instrument; gives the whole run, too.
 observedWith :: Instrument position -> Schedule -> World -> IO (Either String Seen, Run Value)

@@ -2,12 +2,16 @@
 -- The memory that an exploration takes.
 module Sim.ExploreSpaceSpec (spec) where
 
+import Control.Concurrent (mkWeakThreadId, myThreadId)
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
-import Control.Monad (void, when)
+import Control.Monad (replicateM_, void, when)
 import Data.Foldable (for_)
 import Data.IORef
 import Data.Int (Int64)
+import Data.Maybe (catMaybes)
 import GHC.Stats (getRTSStatsEnabled)
+import System.Mem (performMajorGC)
+import System.Mem.Weak (deRefWeak)
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -34,6 +38,17 @@ spec = guarded . describe "In constant memory run" $ do
     (early, late) <- liveAfter 1 200 (exhaustively 2) {planSearch = Exhaustive 2 200} $
       void (allOf (replicate 60 (checkpoint >> sleep 1)))
     late - early `shouldSatisfy` (< 500000)
+
+  it "a run that is kept, without the threads that it had" $ do
+    threads <- newIORef []
+    ran <- simulate . replicateM_ 10 . both (sleep 1) $ do
+      sleep 2
+      thread <- myThreadId >>= mkWeakThreadId
+      modifyIORef' threads (thread :)
+    performMajorGC
+    left <- readIORef threads >>= traverse deRefWeak
+    length (catMaybes left) `shouldBe` 0
+    finished ran `shouldBe` 20
 
 -- | The live bytes at the beginning of these two schedules. They are measured within the
 -- simulation, since the watchdog ends when there is none.

@@ -28,7 +28,6 @@ import qualified Data.Map.Strict as Map
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import GHC.IO (unsafeUnmask)
 
-import Behavior.Internal.Core.SafeText
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.State
 import Behavior.Internal.Sim.Types
@@ -113,7 +112,7 @@ settlePending sim me waiting = do
   for_ gone $ \p -> do
     untilOver p
     writeIORef (released p) True
-    recordStep sim (ReceivesException (safeShow (show (thrown p))))
+    recordReceived sim (thrown p)
     wakeSender sim p
  where
   partitionM test list = do

@@ -33,7 +33,6 @@ import Foreign.StablePtr (newStablePtr)
 
 import Behavior.Internal.Core.Backend
 import Behavior.Internal.Core.Property (Property)
-import Behavior.Internal.Core.SafeText
 import Behavior.Internal.Sim.Coverage (canStart, starts)
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
@@ -192,7 +191,7 @@ arrive sim me = do
         Nothing -> pure ()
         Just e -> do
           writeIORef (pendingException me) Nothing
-          recordStep sim (ReceivesException (safeShow (show e)))
+          recordReceived sim e
           throwIO e
 
 -- | The end of a task, which is an operation too.

@@ -108,7 +108,8 @@ simulateBy o property chooser act = do
     writeIORef (current sim) main
     putMVar (gate main) ()
     verdict <- try (restore (takeMVar (runEnd sim)))
-    left <- fmap taskLabel . filter (isJust . taskThread) . IntMap.elems <$> readIORef (tasks sim)
+    -- (Evaluated: otherwise a run that is kept would keep its threads, with their stacks.)
+    left <- readIORef (tasks sim) >>= traverse (evaluate . taskLabel) . filter (isJust . taskThread) . IntMap.elems
     endTime <- readIORef (time sim)
     made <- reverse <$> readIORef (history sim)
     happened <- map (runIdentity . traverseTexts (Identity . settledText)) . reverse <$> readIORef (emitted sim)

@@ -33,6 +33,7 @@ module Behavior.Internal.Sim.State
     -- * The record
   , recordStep
   , recordDetail
+  , recordReceived
   ) where
 
 import Control.Concurrent
@@ -46,7 +47,9 @@ import qualified Data.Map.Strict as Map
 import Data.Void (Void)
 
 import Behavior.Internal.Core.Backend
+import Behavior.Internal.Core.SafeText (safeShow)
 import Behavior.Internal.Core.Seconds (Seconds)
+import Behavior.Internal.Core.Stop (Stop)
 import Behavior.Internal.Sim.Coverage (Reached, nothingYet)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
@@ -236,3 +239,10 @@ recordStep sim kind = do
 recordDetail :: Sim -> StepKind -> IO ()
 recordDetail sim kind = when (detailedSteps (options sim)) (recordStep sim kind)
 {-# INLINE recordDetail #-}
+
+-- | Records that the task that has the turn receives the exception. (The text of a stop request is made here: a
+-- run that is kept would otherwise keep the threads that were stopped. A user's exception may not have an end.)
+recordReceived :: Sim -> SomeException -> IO ()
+recordReceived sim e = case fromException e of
+  Just request -> recordStep sim . ReceivesException $! show (request :: Stop)
+  Nothing -> recordStep sim (ReceivesException (safeShow (show e)))
