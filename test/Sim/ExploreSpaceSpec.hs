@@ -4,11 +4,12 @@ module Sim.ExploreSpaceSpec (spec) where
 
 import Control.Concurrent (mkWeakThreadId, myThreadId)
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
-import Control.Monad (replicateM_, void, when)
+import Control.Exception (uninterruptibleMask_)
+import Control.Monad (void, when)
 import Data.Foldable (for_)
 import Data.IORef
 import Data.Int (Int64)
-import Data.Maybe (catMaybes)
+import Data.Maybe (isJust)
 import GHC.Stats (getRTSStatsEnabled)
 import System.Mem (performMajorGC)
 import System.Mem.Weak (deRefWeak)
@@ -19,7 +20,7 @@ import Behavior.Parallel (allOf)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
-import Behavior.Time (checkpoint)
+import Behavior.Time (abandoning, checkpoint, timeout)
 import Memory (liveBytes)
 import Support (guarded)
 
@@ -39,16 +40,22 @@ spec = guarded . describe "In constant memory run" $ do
       void (allOf (replicate 60 (checkpoint >> sleep 1)))
     late - early `shouldSatisfy` (< 500000)
 
-  it "a run that is kept, without the threads that it had" $ do
-    threads <- newIORef []
-    ran <- simulate . replicateM_ 10 . both (sleep 1) $ do
-      sleep 2
-      thread <- myThreadId >>= mkWeakThreadId
-      modifyIORef' threads (thread :)
-    performMajorGC
-    left <- readIORef threads >>= traverse deRefWeak
-    length (catMaybes left) `shouldBe` 0
-    finished ran `shouldBe` 20
+  describe "a run that is kept, without the threads that" $ do
+    it "ended" . keepsNone $ \here -> both (sleep 1) (sleep 2 >> here)
+    it "were stopped" . keepsNone $ \here -> sleep 1 ||| (here >> sleep 2)
+    it "were abandoned" . keepsNone $ \here ->
+      timeout 1 (abandoning 1 (uninterruptibleMask_ (here >> sleep 7200))) ? pure ()
+
+-- | The behaviour calls its argument in one thread.
+keepsNone :: (Behavior () -> Behavior a) -> Expectation
+keepsNone behavior = do
+  threads <- newIORef []
+  ran <- simulate . behavior $
+    myThreadId >>= mkWeakThreadId >>= \thread -> modifyIORef' threads (thread :)
+  performMajorGC
+  left <- readIORef threads >>= traverse deRefWeak
+  map isJust left `shouldBe` [False]
+  finished ran `shouldSatisfy` (>= 1)
 
 -- | The live bytes at the beginning of these two schedules. They are measured within the
 -- simulation, since the watchdog ends when there is none.

@@ -30,7 +30,6 @@ import GHC.IO (unsafeUnmask)
 
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.State
-import Behavior.Internal.Sim.Types
 
 -- | Throws to a task, now. The result: the pending exception, if the task cannot receive it
 -- where it is blocked.

@@ -233,7 +233,9 @@ recordStep sim kind = do
   me <- readIORef (current sim)
   t <- readIORef (time sim)
   n <- readIORef (counter sim)
-  modifyIORef' (history sim) (Step t n (taskNumber me) (taskLabel me) (parent me) kind :)
+  -- (A thunk would keep the task, and its thread.)
+  let step = Step t n (taskNumber me) (taskLabel me) (parent me) kind
+  step `seq` modifyIORef' (history sim) (step :)
 
 -- | The same, only in a detailed run.
 recordDetail :: Sim -> StepKind -> IO ()
