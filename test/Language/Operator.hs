@@ -6,8 +6,8 @@
 -- The operators of the library, as plain data: what all random programs have in common.
 --
 -- A program is made of operators and leaves; each use has leaves and signals of its own
--- ("Language.Script", "Language.Primitive"). A new operator is a constructor, and one line in each
--- function of this module.
+-- ("Language.Script", "Language.Primitive"). A new operator is a constructor, and a line in 'traverseBoth', 'shapes',
+-- 'run' and, if it has branches or a signal, 'operatorName'; in the other functions if it concerns them.
 module Language.Operator
   ( Operator (..)
   , Choice (..)
