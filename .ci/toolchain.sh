@@ -192,7 +192,7 @@ build_libraries() {
     cabal*) run_cabal build --enable-tests --only-dependencies all >&2 ;;
     stack*) run_stack build --test --only-dependencies >&2 ;;
   esac
-  build lib:behavior-lang lib:quickcheck lib:unliftio lib:viewer
+  build lib:behavior-lang lib:json lib:quickcheck lib:unliftio lib:viewer
 }
 
 # stanza NAME: the lines of this common stanza of the package description.

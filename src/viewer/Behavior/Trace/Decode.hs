@@ -19,9 +19,9 @@ import Data.Text (Text)
 import qualified Data.Text as Text
 
 import Behavior.Internal.Core.Seconds (Seconds (..))
+import Behavior.Internal.Nesting (nestsDeeperThan)
 import Behavior.Trace
 import Behavior.Trace.Describe (inertUpTo)
-import Behavior.Trace.Json (nestsDeeperThan)
 import Behavior.Trace.Sharing
 
 -- | Why a line is no event.

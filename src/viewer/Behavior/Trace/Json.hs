@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- What the formats made of JSON share: how texts and numbers are written, and how deep a text nests.
+-- What the formats made of JSON share: how texts and numbers are written.
 --
 -- The bytes do not depend on the version of aeson. They contain no character that a terminal or a
 -- web page acts on, whatever the texts are.
@@ -10,7 +10,6 @@ module Behavior.Trace.Json
   , writtenExcept
   , text
   , number
-  , nestsDeeperThan
   ) where
 
 import Data.Aeson.Encoding (Encoding, encodingToLazyByteString, unsafeToEncoding)
@@ -67,29 +66,3 @@ number x
   | otherwise = unsafeToEncoding (string7 (show x))
  where
   whole = truncate x :: Integer
-
--- | Whether brackets nest deeper than that anywhere. To be asked before parsing: a parser needs a few hundred
--- bytes of memory for each bracket.
-nestsDeeperThan :: Int -> Bytes.ByteString -> Bool
-nestsDeeperThan limit content =
-  Bytes.count '[' content + Bytes.count '{' content > fromIntegral limit
-    && deepest (Bytes.foldl' next (Outside 0 0) content) > limit
- where
-  next state c = case state of
-    Outside d m
-      | c == '[' || c == '{' -> Outside (d + 1) (max m (d + 1))
-      | c == ']' || c == '}' -> Outside (d - 1) m
-      | c == '"' -> Within d m
-      | otherwise -> state
-    Within d m
-      | c == '"' -> Outside d m
-      | c == '\\' -> Escaped d m
-      | otherwise -> state
-    Escaped d m -> Within d m
-  deepest state = case state of
-    Outside _ m -> m
-    Within _ m -> m
-    Escaped _ m -> m
-
--- How deep it is there, and at the deepest place before: outside of a text, within one, or after its backslash.
-data Nesting = Outside !Int !Int | Within !Int !Int | Escaped !Int !Int
