@@ -27,12 +27,14 @@ libraries=(
   async:libghc-async-dev
   hspec:libghc-hspec-dev
   HUnit:libghc-hunit-dev
+  network:libghc-network-dev
   optparse-applicative:libghc-optparse-applicative-dev
   QuickCheck:libghc-quickcheck2-dev
   scientific:libghc-scientific-dev
   svg-builder:libghc-svg-builder-dev
   terminal-size:libghc-terminal-size-dev
   unliftio-core:libghc-unliftio-core-dev
+  websockets:libghc-websockets-dev
 )
 debian_packages=(ghc cabal-install "${libraries[@]#*:}")
 
@@ -192,7 +194,7 @@ build_libraries() {
     cabal*) run_cabal build --enable-tests --only-dependencies all >&2 ;;
     stack*) run_stack build --test --only-dependencies >&2 ;;
   esac
-  build lib:behavior-lang lib:json lib:quickcheck lib:unliftio lib:viewer
+  build lib:behavior-lang lib:json lib:quickcheck lib:ros lib:unliftio lib:viewer
 }
 
 # stanza NAME: the lines of this common stanza of the package description.

@@ -9,6 +9,9 @@ import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ScaleSpec
 import qualified Behavior.SpaceSpec
 import qualified Promises.PromisesSimSpec
+import qualified Ros.GoalSpec
+import qualified Ros.LinkSpec
+import qualified Ros.TopicSpec
 import qualified SemanticsSpec
 import qualified Sim.ExploreSpaceSpec
 import qualified Trace.MessagesSpec
@@ -21,6 +24,10 @@ main = hspec $ do
   describe "Traces of random programs" $ do
     Trace.ProgramsSpec.spec
     Trace.MessagesSpec.spec
+  describe "Robots" $ do
+    Ros.GoalSpec.spec
+    Ros.TopicSpec.spec
+    Ros.LinkSpec.spec
   describe "Many schedules" Sim.ExploreSpaceSpec.spec
   describe "Space" $ do
     Behavior.SpaceSpec.spec

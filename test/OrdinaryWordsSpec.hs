@@ -11,6 +11,10 @@
 -- * "Behavior": attempt, both, failed, fallback, monitor, parallel, sleep
 -- * "Behavior.Message": dropped, receive, unhandled
 -- * "Behavior.Parallel": await, decide, fork, pinned, scoped
+-- * "Behavior.Ros": entry, latched, latest, measured, patience, topic
+-- * "Behavior.Ros.Action": action, goal, replacing, untyped
+-- * "Behavior.Ros.Fake": publish, seen, succeeding
+-- * "Behavior.Ros.Messages": charging, percentage, voltage
 -- * "Behavior.STM": check, retry, and what else stm exports
 -- * "Behavior.Time": checkpoint, every, now, timeout
 -- * "Behavior.Trace": adopt, named
@@ -26,6 +30,10 @@ import qualified Test.Hspec as Hspec
 import Behavior
 import Behavior.Message
 import Behavior.Parallel
+import Behavior.Ros
+import Behavior.Ros.Action hiding (goal)
+import Behavior.Ros.Fake
+import Behavior.Ros.Messages
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim

@@ -56,6 +56,7 @@ import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
 import qualified Reality.RealitySpec
+import qualified Ros.WebsocketSpec
 import qualified Sim.ClaimSpec
 import qualified Sim.DeliverySpec
 import qualified Sim.EndSpec
@@ -128,6 +129,7 @@ main = hspec $ do
   describe "Traces" $ do
     Trace.TraceSpec.spec
     Trace.SinkSpec.spec
+  describe "Robots over a websocket" Ros.WebsocketSpec.spec
   describe "Reality" Reality.RealitySpec.spec
   describe "Names" OrdinaryWordsSpec.spec
   describe "The paper" $ do

@@ -1,0 +1,237 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE FlexibleContexts #-}
+{-# LANGUAGE LambdaCase #-}
+{-# LANGUAGE OverloadedStrings #-}
+{-# LANGUAGE ScopedTypeVariables #-}
+{-# LANGUAGE TypeFamilies #-}
+
+-- |
+-- Goals of a robot's actions.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Ros.Internal.Goal
+  ( -- * Actions
+    RosAction (..)
+  , Action
+  , action
+  , untyped
+  , replacing
+
+    -- * Goals
+  , goal
+  , goalWith
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception (SomeException, mask, throwIO, try)
+import Control.Monad (unless, when)
+import Data.Aeson (Value (String), encode)
+import qualified Data.ByteString.Lazy as Bytes
+import qualified Data.Map.Strict as Map
+import Data.Proxy (Proxy (..))
+import Data.Text (Text)
+import qualified Data.Text as Text
+import Data.Text.Encoding (decodeUtf8With)
+import Data.Text.Encoding.Error (lenientDecode)
+
+import Behavior (Behavior, (?))
+import Behavior.Parallel (firstOf)
+import Behavior.Ros.Internal.Error
+import Behavior.Ros.Internal.Frame (Request (..))
+import Behavior.Ros.Internal.Link hiding (feedback)
+import Behavior.Ros.Internal.Message
+import Behavior.Ros.Internal.Options
+import Behavior.STM (atomically)
+import Behavior.Signal (Signal, watching)
+import Behavior.Time (cleanupWithin, sleepForever, timeout)
+import Behavior.Trace (named)
+
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Ros
+-- >>> import Behavior.Ros.Action
+-- >>> import Behavior.Ros.Fake
+-- >>> import Behavior.Sim (simulate)
+-- >>> import Behavior.Time (now, timeout)
+-- >>> import Control.Monad (void)
+
+-- | A type of actions.
+--
+-- > data Fibonacci
+-- >
+-- > instance RosAction Fibonacci where
+-- >   type Goal Fibonacci = Order
+-- >   type Result Fibonacci = Sequence
+-- >   type Feedback Fibonacci = Sequence
+-- >   actionType _ = "test_msgs/action/Fibonacci"
+--
+-- @since 0.1.0.0
+class (RosMessage (Goal a), RosMessage (Result a), RosMessage (Feedback a)) => RosAction a where
+  -- | What is to be done.
+  type Goal a
+
+  -- | What is known in the end.
+  type Result a
+
+  -- | What is known meanwhile.
+  type Feedback a
+
+  -- | The type's name.
+  actionType :: Proxy a -> Text
+
+-- | An action without a type of its own: see 'untyped'.
+instance RosAction Value where
+  type Goal Value = Value
+  type Result Value = Value
+  type Feedback Value = Value
+  actionType _ = ""
+
+-- | An action of a robot: a server that works on goals.
+--
+-- @since 0.1.0.0
+data Action a = Action
+  { nameOf :: Text
+  , typeOf :: Text
+  , preempts :: Bool
+  }
+
+-- | The action with that name (a robot's namespace is a part of it).
+--
+-- > navigate = action "/navigate" :: Action PlanAndRun
+--
+-- @since 0.1.0.0
+action :: forall a. RosAction a => String -> Action a
+action name = Action (Text.pack name) (actionType (Proxy :: Proxy a)) False
+
+-- | The action with that name and type, whose goals, results and feedback are JSON.
+--
+-- > count = untyped "/fibonacci" "test_msgs/action/Fibonacci"
+--
+-- @since 0.1.0.0
+untyped :: String -> String -> Action Value
+untyped name type' = Action (Text.pack name) (Text.pack type') False
+
+-- | The same action, of whose server you know that a new goal replaces the one before (Nav2's is so), or that it can
+-- work on several: a goal of ours that may still run is no reason to refuse a new one.
+--
+-- @since 0.1.0.0
+replacing :: Action a -> Action a
+replacing which = which {preempts = True}
+
+-- | Sends a goal, and waits for its result.
+--
+-- Interrupted, it ends only when the robot has confirmed that the goal has stopped: it asks the server to cancel
+-- this goal, and asks again, after 20, 40, 80, 160 and then every 200 ms, since servers drop a cancel that comes before
+-- they have accepted the goal.
+--
+-- [Result] The goal's, also of one that has succeeded although it was being cancelled.
+-- [Failure] 'Rejected', 'Aborted', 'CancelledByOther'; 'NoServer' if there is no link within
+--   'Behavior.Ros.noServerAfter'; 'StillMoving' if a goal of ours on this action may still run, unless it is
+--   'replacing'. (If the server is not there, it waits: 'Behavior.Time.timeout' limits that.)
+-- [Fault] 'LinkLost' at once when the link is lost; 'Undecodable' if the result is not what is expected;
+--   'NotConfirmed' if the server has not confirmed the stop within 'Behavior.Ros.patience'.
+-- [Cancellation] Returns after the robot has confirmed, or with one of these faults.
+--
+-- With 'NotConfirmed' and 'LinkLost' /the robot may still move/ when the operator goes on: so a
+-- 'Behavior.Signal.monitor' may start its recovery while it does. Such goals are counted ('Behavior.Ros.movingGoals')
+-- until the server says that they have ended; after a new connection that it has no goal left. Until then a new goal
+-- on that action is refused with 'StillMoving'.
+--
+-- >>> let carry = untyped "/carry" "my_robot/action/Carry"
+-- >>> let server _ = succeeding {endsAfter = 60, confirmsAfter = 0.5}
+-- >>> :{
+-- void . simulate . withFakeRobot [("/carry", server)] $ \robot -> withRos (fakeRos robot) $ \ros -> do
+--   timeout 10 (() <$ goal ros carry (toRos ())) ? pure ()
+--   now >>= print
+-- :}
+-- 10.5
+--
+-- @since 0.1.0.0
+goal :: RosAction a => Ros -> Action a -> Goal a -> Behavior (Result a)
+goal ros which wanted = newTVarIO Nothing >>= sendGoal ros which wanted
+
+-- | 'goal' with a behaviour beside it, which is given the goal's feedback. If that behaviour fails or faults, the
+-- goal is stopped, and that is thrown; if it returns, the goal goes on.
+--
+-- > goalWith ros navigate kitchen (\feedback -> Signal.waitUntil ((< 1) . distance \<$\> feedback) >> openGripper)
+--
+-- There is no feedback at first; the behaviour waits for it. Feedback that is not what is expected is the fault
+-- 'Undecodable'. Everything else is as in 'goal'.
+--
+-- @since 0.1.0.0
+goalWith :: RosAction a => Ros -> Action a -> Goal a -> (Signal (Feedback a) -> Behavior ()) -> Behavior (Result a)
+goalWith ros which wanted beside = do
+  latest <- newTVarIO Nothing
+  firstOf
+    [ sendGoal ros which wanted latest
+    , beside (watching (readTVar latest >>= maybe retry (expected which))) >> sleepForever
+    ]
+
+-- | What came from this action.
+expected :: RosMessage b => Action a -> Value -> STM b
+expected which = either (throwSTM . Undecodable (Text.unpack (nameOf which))) pure . decoded
+
+sendGoal :: RosAction a => Ros -> Action a -> Goal a -> TVar (Maybe Value) -> Behavior (Result a)
+sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore -> do
+  (n, running) <- send restore
+  try (restore (atomically (awaitEnd running))) >>= \case
+    Right how -> atomically (conclude how)
+    Left stop -> confirmation ros which n running >>= maybe (throwIO (NotConfirmed name)) (afterStop stop)
+ where
+  name = Text.unpack (nameOf which)
+  -- It is registered and handed over in one transaction: no interruption comes between.
+  send restore = do
+    restore (awaitLink ros)
+    started <- atomically ((Just <$> start ros which (toRos wanted) latest) `orElse` (Nothing <$ whenDown))
+    maybe (send restore) pure started
+  whenDown = readTVar (link ros) >>= check . not . isUp
+  conclude how = case how of
+    Ended 4 values -> expected which values
+    Ended 5 _ -> throwSTM (CancelledByOther name)
+    Ended 6 values -> throwSTM (Aborted name (textOf values))
+    Ended _ values -> throwSTM (Rejected name (textOf values))
+    Complained why -> throwSTM (Rejected name (Text.unpack why))
+    Lost -> readTVar (link ros) >>= throwSTM . LinkLost (robot ros) . whyLost
+  -- What has succeeded has completed, although its stop was requested.
+  afterStop stop how = case how of
+    Ended 4 _ -> atomically (conclude how)
+    Lost -> atomically (conclude how)
+    _ -> throwIO (stop :: SomeException)
+
+-- | What a server says about a goal that it has not done.
+textOf :: Value -> String
+textOf said = case said of
+  String text -> Text.unpack text
+  _ -> Text.unpack (decodeUtf8With lenientDecode (Bytes.toStrict (encode said)))
+
+-- | Registers the goal, and hands it to the writer.
+start :: Ros -> Action a -> Value -> TVar (Maybe Value) -> STM (Text, Sent)
+start ros which wanted latest = do
+  before <- mayRun ros (nameOf which)
+  when (before && not (preempts which)) $ throwSTM (StillMoving (Text.unpack (nameOf which)))
+  n <- readTVar (nextGoal ros)
+  writeTVar (nextGoal ros) $! n + 1
+  connection <- connections <$> readTVar (link ros)
+  running <- Sent (nameOf which) connection <$> newTVar Nothing <*> newTVar False <*> pure latest
+  let name = "goal " <> Text.pack (show n)
+  ask ros (SendGoal name (nameOf which) (typeOf which) wanted)
+  modifyTVar' (sent ros) (Map.insert name running)
+  pure (name, running)
+
+-- | Cancels the goal, again and again, until it has ended or the patience has.
+confirmation :: Ros -> Action a -> Text -> Sent -> Behavior (Maybe End)
+confirmation ros which n running =
+  cleanupWithin (patience (rosOptions ros)) (askEvery ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
+ where
+  askEvery pauses = do
+    ended <- atomically ((Just <$> awaitEnd running) `orElse` (Nothing <$ askToCancel))
+    case (ended, pauses) of
+      (Nothing, pause : later) -> timeout pause (atomically (awaitEnd running)) ? askEvery later
+      _ -> maybe (atomically (awaitEnd running)) pure ended
+  askToCancel = do
+    ask ros (CancelGoal n (nameOf which))
+    before <- readTVar (cancelled running)
+    unless before (writeTVar (cancelled running) True)
+
+awaitEnd :: Sent -> STM End
+awaitEnd running = readTVar (end running) >>= maybe retry pure

@@ -1,0 +1,144 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
+-- |
+-- The threads of a link: one reads, one writes, one asks whether the bridge is there. No user's code runs in them.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Ros.Internal.Keeper
+  ( withRos
+  , withRosWith
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception (ErrorCall (..), finally, throwIO)
+import Control.Monad (forever)
+import Data.Foldable (for_, traverse_)
+import Prelude hiding (take)
+
+import Behavior (Behavior, Seconds, failWith, sleep, tryAny, (?))
+import Behavior.Internal.Core.Seconds (duration)
+import Behavior.Parallel (firstOf)
+import Behavior.Ros.Internal.Frame
+import Behavior.Ros.Internal.Link
+import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Service
+import Behavior.Ros.Internal.Transport
+import Behavior.STM (atomically)
+import Behavior.Time (now, sleepForever, timeout)
+
+-- $setup
+-- >>> import Behavior.Ros
+-- >>> import Behavior.Ros.Fake
+-- >>> import Behavior.Sim (simulate)
+-- >>> import qualified Behavior.Signal as Signal
+-- >>> import Control.Monad (void)
+
+-- | Runs a behaviour with a link to a robot.
+--
+-- > withRos = withRosWith defaultRosOptions
+--
+-- It does not wait for a robot that is not there: what is used first waits. When the link is lost, each goal that is
+-- awaited and each signal that is watched faults at once with 'Behavior.Ros.LinkLost'; meanwhile it connects again,
+-- with growing pauses. Then subscriptions are made again, and goals are /not/ sent again.
+--
+-- [Result] The behaviour's.
+-- [Failure, fault] The behaviour's: thrown. What 'Behavior.Ros.onReport' throws stops the behaviour, and is thrown.
+-- [Cancellation] Requests the stop of the behaviour; the link is there until the behaviour has ended, cleanup
+--   included: so goals are cancelled, and confirmed.
+--
+-- >>> :{
+-- void . simulate . withFakeRobot [] $ \robot -> withRos (fakeRos robot) $ \ros ->
+--   Signal.waitUntil (linkUp ros) >> putStrLn "connected"
+-- :}
+-- connected
+--
+-- @since 0.1.0.0
+withRos :: Transport -> (Ros -> Behavior a) -> Behavior a
+withRos = withRosWith defaultRosOptions
+
+-- | 'withRos' with other options. A duration in them that is negative or NaN is refused with an 'ErrorCall' (a
+-- fault), and so is an address that is not allowed ('Behavior.Ros.rosbridge').
+--
+-- @since 0.1.0.0
+withRosWith :: RosOptions -> Transport -> (Ros -> Behavior a) -> Behavior a
+withRosWith options transport behavior = do
+  for_ [noServerAfter, patience, pingEvery, pongWithin, firstPause, longestPause] (duration "withRosWith" . ($ options))
+  traverse_ (throwIO . ErrorCall) (refusal transport)
+  ros <- newRos (address transport) options
+  servedBy (keeping ros transport) (firstOf [behavior ros, reporting ros])
+    `finally` atomically (goDown ros "its withRos has ended" >> modifyTVar' (link ros) (\l -> l {isClosed = True}))
+
+-- | Passes on the lines about what was refused.
+reporting :: Ros -> Behavior a
+reporting ros = forever (atomically (readTBQueue (reports ros)) >>= onReport (rosOptions ros))
+
+-- | Connects, and connects again whenever the link is lost.
+keeping :: Ros -> Transport -> Behavior a
+keeping ros transport = go (firstPause options)
+ where
+  options = rosOptions ros
+  go pause = do
+    began <- now
+    why <- connected ros transport
+    atomically (goDown ros why)
+    lasted <- subtract began <$> now
+    sleep pause
+    -- (A bridge that closes each connection at once is not asked ever more often.)
+    go (if lasted > longestPause options then firstPause options else min (longestPause options) (2 * pause))
+
+-- | One connection, to its end: why it has ended. (Each branch gives its exception as a value. As a fault, one that
+-- comes while the link is being closed would reach the behaviour's caller.)
+connected :: Ros -> Transport -> Behavior String
+connected ros transport = do
+  up <- newTVarIO False
+  let use connection = do
+        time <- now
+        first <- atomically (writeTVar up True >> comeUp ros time)
+        firstOf [whyItEnds (reading ros connection), whyItEnds (writing ros connection first), whyItEnds (pinging ros)]
+      connecting' = connecting transport (frameBytes (rosOptions ros)) (atomically (receivedAny ros)) use
+      tooLong = do
+        timeout connectWithin (atomically (readTVar up >>= check)) ? failWith "it takes too long to connect"
+        sleepForever
+  firstOf [either show id <$> tryAny connecting', whyItEnds tooLong]
+
+-- | The exception that ends it.
+whyItEnds :: Behavior () -> Behavior String
+whyItEnds act = either show (\() -> "it was closed") <$> tryAny act
+
+-- | How long it may take to connect.
+connectWithin :: Seconds
+connectWithin = 5
+
+-- | Anything was received.
+receivedAny :: Ros -> STM ()
+receivedAny ros = modifyTVar' (received ros) (+ 1)
+
+reading :: Ros -> Connection -> Behavior a
+reading ros connection = forever $ do
+  frame <- receiveFrame connection
+  case decodeAnswer (Limits (frameBytes options) (frameDepth options)) frame of
+    Left why -> atomically (receivedAny ros >> refuse ros why)
+    Right answer -> now >>= \time -> atomically (receivedAny ros >> take ros time answer)
+ where
+  options = rosOptions ros
+
+-- | Writes these requests first. (A ping goes before all that wait.)
+writing :: Ros -> Connection -> [Request] -> Behavior a
+writing ros connection first = do
+  traverse_ write first
+  forever (atomically next >>= maybe (sendPing connection) write)
+ where
+  write = sendFrame connection . encodeRequest
+  next =
+    (Nothing <$ (readTVar (pingWanted ros) >>= check >> writeTVar (pingWanted ros) False))
+      `orElse` (Just <$> readTBQueue (outgoing ros))
+
+-- | Asks whether the bridge is there. Anything that comes is an answer.
+pinging :: Ros -> Behavior a
+pinging ros = forever $ do
+  sleep (pingEvery options)
+  before <- atomically (writeTVar (pingWanted ros) True >> readTVar (received ros))
+  timeout (pongWithin options) (atomically (readTVar (received ros) >>= check . (/= before)))
+    ? failWith ("nothing was received within " ++ show (pongWithin options) ++ " s after a ping")
+ where
+  options = rosOptions ros

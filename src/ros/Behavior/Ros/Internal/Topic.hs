@@ -1,0 +1,199 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- Topics as signals.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Ros.Internal.Topic
+  ( -- * Topics
+    Topic
+  , topic
+  , Silence
+  , atLeastEvery
+  , latched
+
+    -- * Their signals
+  , latest
+  , measured
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception (SomeException, toException)
+import Control.Monad (join, void, when)
+import Data.Foldable (traverse_)
+import Data.Maybe (isNothing)
+import Data.Proxy (Proxy (..))
+import Data.Text (Text)
+import qualified Data.Text as Text
+
+import Behavior (Behavior, Seconds, tryAny)
+import Behavior.Internal.Core.Seconds (period)
+import Behavior.Internal.Signal.Source
+import Behavior.Ros.Internal.Error
+import Behavior.Ros.Internal.Frame (Request (..))
+import Behavior.Ros.Internal.Link
+import Behavior.Ros.Internal.Message
+import Behavior.STM (atomically)
+import Behavior.Time (now, sleepUntil)
+
+-- $setup
+-- >>> import Behavior
+-- >>> import Behavior.Ros
+-- >>> import Behavior.Ros.Fake
+-- >>> import Behavior.Ros.Messages
+-- >>> import Behavior.Sim (simulate)
+-- >>> import qualified Behavior.Signal as Signal
+-- >>> import Behavior.Time (now)
+-- >>> import Control.Monad (void)
+
+-- | A robot's topic, and how long it may be silent.
+--
+-- @since 0.1.0.0
+data Topic a = Topic Text Silence
+
+-- | How long a topic may be silent: 'atLeastEvery', or 'latched'.
+--
+-- @since 0.1.0.0
+newtype Silence = Silence Seconds
+
+-- | A message comes at least that often. If none has come for that time, the topic's signal faults with
+-- 'Silent'. (It must be at least a microsecond; otherwise the signal faults with an
+-- 'Control.Exception.ErrorCall' when it is watched.)
+--
+-- @since 0.1.0.0
+atLeastEvery :: Seconds -> Silence
+atLeastEvery = Silence
+
+-- | The topic may be silent: its last message counts, however old it is.
+--
+-- @since 0.1.0.0
+latched :: Silence
+latched = Silence (1 / 0)
+
+-- | The topic with that name (a robot's namespace is a part of it), and its expected silence. Without that a robot
+-- whose sensor has died would be one whose battery is full: so there is no default.
+--
+-- > battery = topic "/battery_state" (atLeastEvery 2) :: Topic BatteryState
+--
+-- @since 0.1.0.0
+topic :: String -> Silence -> Topic a
+topic = Topic . Text.pack
+
+-- | The latest message of a topic.
+--
+-- While no message has come there is no value: the operator waits. It subscribes when it is first watched, and if no
+-- message has come after half of the expected silence, once more.
+--
+-- [Failure] 'NoServer', if there is no link within 'Behavior.Ros.noServerAfter'.
+-- [Fault] 'Silent' after the expected silence, also if no message ever came; 'LinkLost' at once when the link is
+--   lost; 'Undecodable' while the last message is not what is expected (until one comes that is).
+--
+-- A message that is older than the expected silence when the operator begins does not count, nor one from before a
+-- loss of the link. (Some publishers keep their last message for new subscribers: that one counts when it comes,
+-- whatever its age.)
+--
+-- The topic stays subscribed to until 'Behavior.Ros.withRos' ends, and all signals of that name share the
+-- subscription: for later operators the last value is there at once.
+--
+-- >>> :{
+-- void . simulate . withFakeRobot [] $ \robot -> withRos (fakeRos robot) $ \ros -> do
+--   let battery = topic "/battery_state" (atLeastEvery 2)
+--       publishes p = sleep 1 >> publish robot "/battery_state" (toRos (BatteryState Nothing (Just p) False))
+--   mapM_ publishes [0.2, 0.05] `both` Signal.waitUntil ((< 0.1) <$> measured percentage (latest ros battery))
+--   now >>= print
+-- :}
+-- 2.0
+--
+-- @since 0.1.0.0
+latest :: forall a. RosMessage a => Ros -> Topic a -> Signal a
+latest ros (Topic name (Silence silence)) = Signal $ \_ -> do
+  _ <- period ("latest " ++ Text.unpack name) silence
+  time <- now
+  known <- atomically (keptOf ros name (messageType (Proxy :: Proxy a)) time)
+  judged <- newTVarIO Unjudged
+  pure
+    (fromView (viewing known judged))
+      {workers = [Worker "silence" (const (watchSilence ros name silence known judged) <$ writeTVar judged Unjudged)]}
+ where
+  viewing known judged = do
+    before <- losses <$> readTVar (link ros)
+    pure . constantView $ do
+      void (lostSince ros before)
+      readTVar judged >>= \case
+        Unjudged -> retry
+        Lacking why -> throwSTM why
+        From n ->
+          readTVar (newest known) >>= \case
+            Just arrival | arrivalNumber arrival >= n -> either undecodable pure (decoded (arrived arrival))
+            _ -> retry
+  undecodable = throwSTM . Undecodable (Text.unpack name)
+
+-- | Which messages count.
+data Judged
+  = -- | It is not known yet.
+    Unjudged
+  | -- | There should be one, and there is none.
+    Lacking SomeException
+  | -- | Those from this number on.
+    From !Int
+
+-- | Watches how long the topic is silent.
+watchSilence :: Ros -> Text -> Seconds -> Kept -> TVar Judged -> Behavior ()
+watchSilence ros name silence known judged = do
+  tryAny (awaitLink ros) >>= either (atomically . writeTVar judged . Lacking) pure
+  -- (A signal that is shared may have a value later.)
+  atomically (readTVar (link ros) >>= check . isUp)
+  begun <- now
+  join . atomically $ do
+    n <- readTVar (arrivals known)
+    readTVar (newest known) >>= \case
+      Just arrival | arrivedAt arrival + silence >= begun -> follow (arrivedAt arrival) n <$ writeTVar judged (From n)
+      _ -> follow begun n <$ writeTVar judged (From (n + 1))
+ where
+  follow since n = do
+    sleepUntil (since + silence / 2)
+    next n (askAgain >> judge since n)
+  judge since n = do
+    sleepUntil (since + silence)
+    join . atomically $
+      newer n >>= \case
+        Just arrival -> pure (goOn arrival)
+        Nothing -> do
+          writeTVar judged (Lacking (toException (Silent (Text.unpack name) silence)))
+          pure $ do
+            arrival <- atomically $ do
+              arrival <- newer n >>= maybe retry pure
+              arrival <$ writeTVar judged (From (arrivalNumber arrival))
+            goOn arrival
+  next n otherwise' = atomically (newer n) >>= maybe otherwise' goOn
+  goOn arrival = follow (arrivedAt arrival) (arrivalNumber arrival)
+  newer n = (\found -> if (arrivalNumber <$> found) > Just n then found else Nothing) <$> readTVar (newest known)
+  -- The bridge may have lost the subscription. (But if a message has come over this connection, it has not: and a
+  -- publisher that keeps its last message for new subscribers would send that again, as if it were alive.)
+  askAgain = do
+    time <- now
+    atomically $ do
+      none <- isNothing <$> readTVar (newest known)
+      up <- isUp <$> readTVar (link ros)
+      -- (The watch of another operator may have asked just now.)
+      asked <- readTVar (askedAt known)
+      when (none && up && time - asked >= 0.4 * silence) $ do
+        writeTVar (askedAt known) time
+        traverse_ (ask ros) [Unsubscribe name, Subscribe name (keptType known)]
+
+-- | The number in a message that may be null (which bridges write for NaN and infinity). While it is null, or NaN,
+-- the signal faults with 'NotMeasured': it compares itself into neither true nor false.
+--
+-- > batteryLow = (< 0.1) \<$\> measured percentage (latest ros battery)
+--
+-- @since 0.1.0.0
+measured :: (a -> Maybe Double) -> Signal a -> Signal Double
+measured number signal = Signal $ \demand -> do
+  source <- open signal everyValue {readingTimes = readingTimes demand}
+  pure source {view = mapView (>>= taken . number) <$> view source}
+ where
+  taken found = case found of
+    Just x | not (isNaN x) -> pure x
+    _ -> throwSTM NotMeasured

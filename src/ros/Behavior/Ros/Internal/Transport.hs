@@ -1,0 +1,36 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE RankNTypes #-}
+
+-- |
+-- What carries frames to a bridge and back. The link knows only this, so that the same code runs over a websocket
+-- and, in a simulation, over a fake.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Ros.Internal.Transport
+  ( Transport (..)
+  , Connection (..)
+  ) where
+
+import Data.ByteString.Lazy (ByteString)
+
+import Behavior (Behavior)
+
+-- | The way to a robot: made by 'Behavior.Ros.rosbridge', or by 'Behavior.Ros.Fake.fakeRos' for tests.
+--
+-- @since 0.1.0.0
+data Transport = Transport
+  { address :: String
+  -- ^ For the texts of errors.
+  , refusal :: Maybe String
+  -- ^ Why this way is never taken, if so.
+  , connecting :: forall a. Int -> Behavior () -> (Connection -> Behavior a) -> Behavior a
+  -- ^ Connects, and runs the behaviour while it is connected. It is given how many bytes a frame has at most, and
+  -- what to call when something was received that is no frame (the answer to a ping).
+  }
+
+-- | A connection. Each of these throws when it is lost.
+data Connection = Connection
+  { receiveFrame :: Behavior ByteString
+  , sendFrame :: ByteString -> Behavior ()
+  , sendPing :: Behavior ()
+  }

@@ -1,0 +1,186 @@
+{-# LANGUAGE OverloadedStrings #-}
+{-# LANGUAGE TypeFamilies #-}
+
+-- |
+-- Goals of a robot that is at the other end of a link.
+module Ros.GoalSpec (spec) where
+
+import Control.Exception (finally, throwIO, try)
+import Control.Monad (void)
+import Data.Aeson (Value (..), object, (.=))
+import Data.IORef
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Parallel (firstOf)
+import Behavior.Ros
+import Behavior.Ros.Action
+import Behavior.Ros.Fake
+import Behavior.STM
+import qualified Behavior.Signal as Signal
+import Behavior.Time
+import Ros.Stage
+import Support (guarded)
+
+spec :: Spec
+spec = guarded $ do
+  describe "A goal" $ do
+    it "gives its result" . underSchedules 40 . mission (const succeeding {endsWith = Succeeds "a cup"}) $
+      \_ ros -> inSeconds 1 (carrying ros "cup") >>= (`shouldBe` "a cup")
+    it "fails as it ended: by its status, whatever the field \"result\" says" $ do
+      let ends how = mission (const succeeding {endsWith = how}) (\_ ros -> try (carrying ros "cup"))
+          endsAs how failure = underSchedules 40 (ends how >>= (`shouldBe` Left failure))
+      Aborts "too heavy" `endsAs` Aborted "/carry" "too heavy"
+      Cancels `endsAs` CancelledByOther "/carry"
+      Refuses `endsAs` Rejected "/carry" "the goal was not accepted"
+    it "is rejected by a bridge that complains about it" . underSchedules 40 . mission (const succeeding) $ \_ ros ->
+      try (goal ros (untyped "/fly" "my_robot/action/Fly") Null)
+        >>= (`shouldBe` Left (Rejected "/fly" "there is no action /fly"))
+    it "faults if its result is not what is expected" . underSchedules 40 . mission (const succeeding) $ \_ ros ->
+      tried (goal ros (action "/carry" :: Action Counting) 3)
+        >>= (`shouldBe` Left (Undecodable "/carry" "Error in $: this is no number"))
+    it "fails when there is no link in time" . underSchedules 40 . mission (const succeeding) $ \robot ros -> do
+      awaitUp ros
+      loseLink robot
+      Signal.waitUntil (not <$> linkUp ros)
+      inSeconds 5 (try (carrying ros "cup")) >>= (`shouldBe` Left (NoServer "the fake robot"))
+    it "waits for a link that comes in time" . underSchedules 40 $
+      withFakeRobot [("/carry", const succeeding)] $ \robot -> do
+        loseLink robot
+        (sleep 3 >> restoreLink robot) `both` withRos (fakeRos robot) (\ros -> void (carrying ros "cup"))
+    it "shows its feedback to a behaviour beside it" . underSchedules 40 $ do
+      let script = slowly {feedbacks = [(1, Number 5), (1, Number 2), (1, Number 0.5)]}
+          near distance = case distance of
+            Number n -> n < 1
+            _ -> False
+      mission (const script) $ \_ ros -> do
+        seenAt <- newIORef 0
+        _ <- goalWith ros carry "cup" (\feedback -> Signal.waitUntil (near <$> feedback) >> now >>= writeIORef seenAt)
+        (,) <$> readIORef seenAt <*> now >>= (`shouldBe` (3, 60))
+    it "is stopped when the behaviour beside it fails" . underSchedules 40 . mission (const slowly) $ \robot ros -> do
+      void (goalWith ros carry "cup" (\_ -> sleep 5 >> failed)) ? pure ()
+      robot `has` []
+
+  describe "A goal that is stopped" $ do
+    it "ends only when the robot has confirmed that it has stopped" . underSchedules 150 . mission (const slowly) $
+      \robot ros -> do
+        inSeconds 10.5 (stopAfter 10 (carrying ros "cup")) >>= (`shouldBe` Nothing)
+        robot `has` []
+    it "has stopped before a recovery starts" . underSchedules 150 . mission (const slowly) $ \robot ros -> do
+      low <- newTVarIO False
+      let recharge = robot `has` [] >> atomically (writeTVar low False)
+          empties = sleep 5 >> atomically (writeTVar low True)
+      empties `both` Signal.monitor (Signal.watching (readTVar low)) recharge (void (carrying ros "cup"))
+    it "is confirmed also when the link's own behaviour is stopped" . underSchedules 150 $
+      withFakeRobot [("/carry", const slowly)] $ \robot -> do
+        _ <- inSeconds 10.5 (stopAfter 10 (withRos (fakeRos robot) (`carrying` "cup")))
+        robot `has` []
+    it "is cancelled again when it had not been accepted, and a complaint is not its end" . underSchedules 150 $
+      mission (const slowly {acceptedAfter = 0.1}) $ \robot ros -> do
+        awaitUp ros
+        _ <- inSeconds 0.641 (stopAfter 0.001 (carrying ros "cup"))
+        robot `has` []
+        came <- atomically (seen robot)
+        -- (At 0, 20, 60 and 140 ms; and at 300 and 500 ms until it is confirmed.)
+        [accepted | (_, CancelCame 1 accepted) <- came] `shouldBe` [False, False, False, True, True, True]
+    it "that succeeds all the same has completed" . underSchedules 150 $
+      mission (const slowly {confirmsWith = Succeeds "a cup"}) $ \_ ros ->
+        inSeconds 10.5 (stopAfter 10 (carrying ros "cup")) >>= (`shouldBe` Just "a cup")
+    it "that is aborted meanwhile has stopped" . underSchedules 40 $
+      mission (const slowly {confirmsWith = Aborts "fell"}) $ \_ ros ->
+        inSeconds 10.5 (stopAfter 10 (carrying ros "cup")) >>= (`shouldBe` Nothing)
+
+  describe "A goal whose stop is not confirmed" $ do
+    it "is a fault when the patience has ended" . underSchedules 150 . mission (const stubborn) $ \_ ros ->
+      inSeconds 12 (tried (stopAfter 10 (carrying ros "cup"))) >>= (`shouldBe` Left (NotConfirmed "/carry"))
+    it "makes new ones be refused, until it has ended" . underSchedules 40 . mission (const stubborn) $ \robot ros -> do
+      _ <- tried (stopAfter 10 (carrying ros "cup"))
+      Signal.read (movingGoals ros) >>= (`shouldBe` 1)
+      try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
+      robot `has` [1]
+      sleep 50
+      Signal.read (movingGoals ros) >>= (`shouldBe` 0)
+      void (carrying ros "pot")
+    it "does not make one be refused that replaces it; whose result is not that of the other" . underSchedules 40 $ do
+      let scripts = [("cup", stubborn {endsWith = Succeeds "a cup"}), ("pot", slowly {endsWith = Succeeds "a pot"})]
+      mission (named scripts) $ \robot ros -> do
+        _ <- tried (stopAfter 10 (carrying ros "cup"))
+        -- (The cup's result comes 12 s before that of the pot.)
+        goal ros (replacing carry) "pot" >>= (`shouldBe` "a pot")
+        robot `has` []
+    it "makes one that is still awaited be refused, too" . underSchedules 40 . mission (const slowly) $ \_ ros -> do
+      awaitUp ros
+      let second = sleep 5 >> try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
+      second `both` void (carrying ros "cup")
+    it "is not one whose result has another id" . underSchedules 40 . mission (const slowly) $ \robot ros -> do
+      let lie = sleep 5 >> sendBytes robot "{\"op\":\"action_result\",\"id\":\"goal 7\",\"status\":4}"
+      lie `both` (inSeconds 60 (carrying ros "cup") >>= (`shouldBe` object []))
+
+  describe "When the link is lost" $ do
+    it "a goal faults at once, and its cleanups run" . underSchedules 150 . mission (const slowly) $ \robot ros -> do
+      parked <- newIORef False
+      let act = inSeconds 10 (tried (carrying ros "cup" `finally` writeIORef parked True))
+      lost <- firstOf [sleep 10 >> loseLink robot >> sleepForever, act]
+      lost `shouldBe` Left linkLost
+      readIORef parked >>= (`shouldBe` True)
+    it "a goal that is being cancelled faults at once" . underSchedules 99 . mission (const stubborn) $ \robot ros -> do
+      let act = inSeconds 10.5 (tried (stopAfter 10 (carrying ros "cup")))
+      lost <- firstOf [sleep 10.5 >> loseLink robot >> sleepForever, act]
+      lost `shouldBe` Left linkLost
+    it "goals are not sent again, and new ones are refused while the old one runs" . underSchedules 80 $
+      mission (const slowly) $ \robot ros -> do
+        let losing = sleep 10 >> loseLink robot >> sleep 5 >> restoreLink robot >> sleepForever
+        _ <- firstOf [losing, tried (carrying ros "cup") <* sleep 10]
+        awaitUp ros
+        robot `has` [1]
+        try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
+        came <- atomically (seen robot)
+        length [() | (_, GoalCame _ _) <- came] `shouldBe` 1
+        sleep 45
+        robot `has` []
+        void (carrying ros "pot")
+    it "what was not sent yet is never sent" . underSchedules 100 . mission (const slowly) $ \robot ros -> do
+      awaitUp ros
+      void (tried (loseLink robot ||| carrying ros "cup"))
+      sleep 5 >> restoreLink robot >> awaitUp ros >> sleep 1
+      came <- atomically (seen robot)
+      [time | (time, GoalCame _ _) <- came, time > 0] `shouldBe` []
+    it "a status without goals does not concern a goal that was sent since" . underSchedules 80 $
+      mission (named [("cup", slowly), ("pot", slowly {endsAfter = 90})]) $ \robot ros -> do
+        let losing = sleep 10 >> loseLink robot >> sleep 5 >> restoreLink robot >> sleepForever
+        _ <- firstOf [losing, tried (carrying ros "cup") <* sleep 10]
+        awaitUp ros
+        let none = sleep 5 >> publish robot "/carry/_action/status" (object ["status_list" .= ([] :: [Value])])
+        none `both` inSeconds 90 (void (goal ros (replacing carry) "pot"))
+    it "a new goal is sent after it if the old one has ended meanwhile" . underSchedules 80 $
+      mission (const slowly) $ \robot ros -> do
+        let losing = sleep 10 >> loseLink robot >> sleep 55 >> restoreLink robot >> sleepForever
+        _ <- firstOf [losing, tried (carrying ros "cup") <* sleep 60]
+        void (carrying ros "pot")
+
+-- | An action whose goals and results are numbers.
+data Counting
+
+instance RosAction Counting where
+  type Goal Counting = Double
+  type Result Counting = Double
+  type Feedback Counting = Double
+  actionType _ = "my_robot/action/Count"
+
+-- | Takes a minute, and does not stop.
+stubborn :: GoalScript
+stubborn = slowly {confirmsAfter = 1 / 0}
+
+linkLost :: RosFault
+linkLost = LinkLost "the fake robot" "user error (connection lost)"
+
+tried :: Behavior a -> Behavior (Either RosFault a)
+tried = try
+
+awaitUp :: Ros -> Behavior ()
+awaitUp = Signal.waitUntil . linkUp
+
+-- | These goals run on the robot.
+has :: FakeRobot -> [Int] -> Behavior ()
+has robot expected = atomically (runningGoals robot) >>= \running ->
+  if running == expected then pure () else throwIO (userError ("goals on the robot: " ++ show running))

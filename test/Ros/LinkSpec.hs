@@ -1,0 +1,119 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- The link to a robot: what comes over it that is no frame, and how it is kept.
+module Ros.LinkSpec (spec) where
+
+import Control.Exception (ErrorCall (..), try)
+import Control.Monad (forM_, void)
+import qualified Data.ByteString.Lazy as Bytes
+import qualified Data.ByteString.Lazy.Char8 as Chars
+import Data.IORef
+import Data.List (isInfixOf)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Parallel (firstOf)
+import Behavior.Ros
+import Behavior.Ros.Fake
+import Behavior.Ros.Internal.Frame
+import Behavior.STM
+import qualified Behavior.Signal as Signal
+import Behavior.Time
+import Ros.Stage
+import Support (ending, guarded)
+import qualified Support
+
+spec :: Spec
+spec = guarded $ do
+  describe "What is no frame" $ do
+    it "is refused, counted and reported, and the goal goes on" . underSchedules 10 $ do
+      lines' <- newIORef []
+      let options = defaultRosOptions {onReport = \line -> modifyIORef lines' (line :)}
+      missionWith options (const slowly) $ \robot ros -> do
+        Signal.waitUntil (linkUp ros)
+        let sending = sleep 1 >> forM_ hostile (sendBytes robot . fst) >> sleepForever
+        _ <- firstOf [sending, inSeconds 60 (carrying ros "cup")]
+        Signal.read (refusedFrames ros) >>= (`shouldBe` length hostile)
+        said <- reverse <$> readIORef lines'
+        forM_ (zip said (map snd hostile)) $ \(line, why) -> line `shouldSatisfy` (why `isInfixOf`)
+        length said `shouldBe` length hostile
+    it "is refused by its depth before it is parsed" $ do
+      let deep n = Bytes.concat ["{\"op\":\"x\",\"a\":", Chars.replicate (n - 1) '[', Chars.replicate (n - 1) ']', "}"]
+      decodeAnswer limits (deep 64) `shouldBe` Right (Other "x")
+      decodeAnswer limits (deep 65) `shouldBe` Left "a frame that nests deeper than 64"
+    it "is refused by its size" $ do
+      let large n = Bytes.concat ["{\"op\":\"x\"}", Chars.replicate (n - 10) ' ']
+      decodeAnswer limits (large 1000) `shouldBe` Right (Other "x")
+      decodeAnswer limits (large 1001) `shouldBe` Left "a frame of 1001 bytes; allowed: 1000"
+  describe "A report" $
+    it "that faults stops the behaviour, and is thrown" . underSchedules 40 $ do
+      let options = defaultRosOptions {onReport = const throwFault}
+      end <- ending . missionWith options (const slowly) $ \robot ros -> do
+        Signal.waitUntil (linkUp ros)
+        sendBytes robot "?"
+        void (carrying ros "cup")
+      end `shouldBe` Support.FaultedWith "user error (full disk)"
+
+  describe "A link" $ do
+    it "that is half open is lost after a ping" . underSchedules 80 . missionWith defaultRosOptions (const slowly) $
+      \robot ros -> do
+        Signal.waitUntil (linkUp ros)
+        let freezing = sleep 10.5 >> freezeLink robot >> sleepForever
+        end <- firstOf [freezing, inSeconds 12 (try (carrying ros "cup"))]
+        either (`shouldSatisfy` isLost) (const (expectationFailure "it returned")) end
+    it "that is quiet is not lost" . underSchedules 10 . missionWith defaultRosOptions (const slowly) $
+      \robot ros -> do
+        sleep 60
+        Signal.read (linkUp ros) >>= (`shouldBe` True)
+        atomically (seen robot) >>= (`shouldBe` [(0, Connected)])
+    it "is there again soon after the bridge" . underSchedules 80 . mission (const slowly) $ \robot ros -> do
+      Signal.waitUntil (linkUp ros)
+      loseLink robot >> sleep 10 >> restoreLink robot
+      began <- now
+      Signal.waitUntil (linkUp ros)
+      took <- subtract began <$> now
+      took `shouldSatisfy` (<= 1)
+    it "does not outlive its behaviour, and is of no use then" . underSchedules 40 . withFakeRobot [] $ \robot -> do
+      ros <- withRos (fakeRos robot) pure
+      end <- try (carrying ros "cup")
+      either (\e -> e `shouldBe` LinkLost "the fake robot" "its withRos has ended") (const (expectationFailure "!")) end
+    it "of another robot is not concerned" . underSchedules 40 . withFakeRobot [] $ \one ->
+      mission (const slowly) $ \_ ros ->
+        (sleep 5 >> loseLink one) `both` withRos (fakeRos one) (\_ -> inSeconds 60 (void (carrying ros "cup")))
+
+  describe "An address" $ do
+    forM_ [("ws://127.0.0.1:9090", True), ("ws://localhost:1/x", True), ("ws://[::1]:9090", True)] allowed
+    forM_ [("ws://10.0.0.1:9090", False), ("wss://127.0.0.1:9090", False), ("ws://127.0.0.1", False)] allowed
+    forM_ [("ws://127.evil.org:1", False), ("ws://127.0.0.1:70000", False), ("", False)] allowed
+  describe "A duration" $
+    it "is not negative" $
+      withFakeRobot [] (\robot -> withRosWith defaultRosOptions {patience = -1} (fakeRos robot) (\_ -> pure ()))
+        `shouldThrow` errorCall "withRosWith: a duration is zero or more seconds, not -1.0"
+ where
+  limits = Limits 1000 64
+  throwFault = ioError (userError "full disk")
+  isLost e = case e of
+    LinkLost _ why -> "nothing was received" `isInfixOf` why
+    _ -> False
+  allowed (address, is) = it (show address ++ " is " ++ (if is then "allowed" else "refused")) $ do
+    end <- try (withRos (rosbridge address) (\_ -> pure ()))
+    either (\(ErrorCall _) -> False) (const True) end `shouldBe` is
+
+-- | Frames that are none, and what is said about them.
+hostile :: [(Bytes.ByteString, String)]
+hostile =
+  [ ("", "not enough input")
+  , ("{\"op\":\"publish\",\"topic\":\"/level\",\"msg\":{\"data\":0.", "Error in $")
+  , ("[]", "parsing a frame failed")
+  , ("{\"id\":\"goal 1\",\"status\":4}", "key \"op\" not found")
+  , ("{\"op\":4}", "parsing Text failed")
+  , ("{\"op\":\"action_result\",\"id\":\"goal 1\",\"status\":\"4\"}", "parsing Int failed")
+  , ("{\"op\":\"action_result\",\"id\":\"goal 1\",\"status\":2}", "a result with the status 2")
+  , ("{\"op\":\"action_result\",\"id\":1,\"status\":4}", "parsing Text failed")
+  , ("{\"op\":\"action_result\",\"id\":\"goal 1\",\"status\":1e1000000000}", "parsing Int failed")
+  , ("{\"op\":\"publish\",\"topic\":\"/level\",\"msg\":NaN}", "Error in $")
+  , (Chars.replicate 1000000 '[', "nests deeper than 64")
+  , (Chars.replicate 1048577 ' ', "a frame of 1048577 bytes")
+  , ("\255\254", "Error in $")
+  ]

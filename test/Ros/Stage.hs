@@ -1,0 +1,76 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- What the specs of robots share: a fake robot with one action, and schedules.
+module Ros.Stage
+  ( mission
+  , missionWith
+  , underSchedules
+  , carry
+  , carrying
+  , slowly
+  , stopAfter
+  , named
+  , inSeconds
+  ) where
+
+import Control.Exception (throwIO)
+import Control.Monad (void)
+import Data.Aeson (Value (..))
+import Data.Text (Text)
+
+import Behavior
+import Behavior.Ros
+import Behavior.Ros.Action
+import Behavior.Ros.Fake
+import Behavior.Sim
+import Behavior.Time (now, timeout)
+
+-- | A mission with a fake robot, whose action "/carry" does with each goal what the script says. (It sends few pings,
+-- so that it is simulated quickly.)
+mission :: (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
+mission = missionWith defaultRosOptions {pingEvery = 10}
+
+missionWith :: RosOptions -> (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
+missionWith options script act =
+  withFakeRobot [("/carry", script)] $ \robot -> withRosWith options (fakeRos robot) (act robot)
+
+-- | The behaviour ends without an exception, within ten minutes, under each of that many random schedules, and under
+-- the one without pre-emptions.
+underSchedules :: Int -> Behavior () -> IO ()
+underSchedules n act = do
+  simulateWith options act >>= well
+  void (explore (randomly n) {planOptions = options} (\simulated -> simulated act >>= well))
+ where
+  options = defaultSimOptions {endAt = 600}
+
+carry :: Action Value
+carry = untyped "/carry" "my_robot/action/Carry"
+
+-- | Carries that thing.
+carrying :: Ros -> Text -> Behavior Value
+carrying ros = goal ros carry . String
+
+-- | Takes a minute; a cancel is confirmed after half a second.
+slowly :: GoalScript
+slowly = succeeding {endsAfter = 60, confirmsAfter = 0.5}
+
+-- | Stops the behaviour after that time, and gives its result, if it has one all the same.
+stopAfter :: Seconds -> Behavior a -> Behavior (Maybe a)
+stopAfter seconds act = (Just <$> timeout seconds act) ? pure Nothing
+
+-- | A goal by what it carries.
+named :: [(Text, GoalScript)] -> Value -> GoalScript
+named scripts wanted = case [script | (name, script) <- scripts, String name == wanted] of
+  script : _ -> script
+  [] -> succeeding
+
+-- | The behaviour takes that long, to a thousandth of a second.
+inSeconds :: Seconds -> Behavior a -> Behavior a
+inSeconds expected act = do
+  begun <- now
+  a <- tryAny act
+  took <- subtract begun <$> now
+  if abs (took - expected) < 0.001
+    then either throwIO pure a
+    else fail ("it took " ++ show took ++ " s, not " ++ show expected ++ ": " ++ either show (const "it returned") a)

@@ -1,0 +1,101 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- The same over a real websocket: a server on this machine, behind which is a fake robot.
+module Ros.WebsocketSpec (spec) where
+
+import Control.Exception (SomeException, bracket, finally, try)
+import Control.Monad (forever, void)
+import Data.Aeson (Value, object, (.=))
+import Network.Socket (Socket, accept, close, socketPort)
+import qualified Network.WebSockets as Websockets
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Parallel (firstOf, fork, scoped)
+import Behavior.Ros
+import Behavior.Ros.Fake
+import Behavior.Ros.Internal.Link (received)
+import Behavior.Ros.Internal.Service
+import Behavior.Ros.Internal.Transport
+import Behavior.Ros.Messages
+import Behavior.STM
+import qualified Behavior.Signal as Signal
+import Behavior.Time
+import Ros.Stage
+import Support (guarded)
+
+spec :: Spec
+spec = guarded $ do
+  it "a goal gives its result" $
+    onSocket quickly $ \_ ros -> carrying ros "cup" >>= (`shouldBe` "a cup")
+  it "a goal that is stopped ends when the robot has confirmed that it has stopped" $
+    onSocket slow $ \robot ros -> do
+      Signal.waitUntil (linkUp ros)
+      started <- try (isRunning robot ||| carrying ros "cup")
+      either (\e -> expectationFailure (show (e :: RosFault))) pure started
+      atomically (runningGoals robot) >>= (`shouldBe` [])
+      came <- map snd <$> atomically (seen robot)
+      [status | GoalEnded 1 status <- came] `shouldBe` [5]
+  it "a topic has its messages" $
+    onSocket quickly $ \robot ros -> do
+      let level = topic "/level" (atLeastEvery 10) :: Topic (Std (Maybe Double))
+          charge l = publish robot "/level" (object ["data" .= (l :: Double)])
+      charge 0.5
+      both
+        (Signal.waitUntil ((> 0.1) <$> measured unStd (latest ros level)) >> charge 0.05)
+        (Signal.waitUntil ((< 0.1) <$> measured unStd (latest ros level)))
+  it "a goal faults when the bridge ends" $
+    onSocket slow $ \robot ros -> do
+      end <- try (firstOf [isRunning robot >> loseLink robot >> sleepForever, carrying ros "cup"])
+      case end of
+        Left (LinkLost _ _) -> pure ()
+        _ -> expectationFailure (show end)
+  it "a link is there again after the bridge" $
+    onSocket quickly $ \robot ros -> do
+      Signal.waitUntil (linkUp ros)
+      loseLink robot
+      Signal.waitUntil (not <$> linkUp ros)
+      restoreLink robot
+      void (carrying ros "cup")
+  it "a link whose bridge answers pings stays" $
+    onSocketWith patient {pingEvery = 0.01} quickly $ \robot ros -> do
+      Signal.waitUntil (linkUp ros)
+      -- (The server's thread that receives answers them; nothing else comes.)
+      pongs <- Signal.read (Signal.watching (readTVar (received ros)))
+      Signal.waitUntil ((> pongs + 3) <$> Signal.watching (readTVar (received ros)))
+      atomically (map snd <$> seen robot) >>= (`shouldBe` [Connected])
+ where
+  quickly = const succeeding {endsAfter = 0.01, endsWith = Succeeds "a cup"}
+  slow = const succeeding {endsAfter = 3600, confirmsAfter = 0.05, acceptedAfter = 0.01}
+  isRunning robot = atomically (runningGoals robot >>= check . not . null)
+
+onSocket :: (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
+onSocket = onSocketWith patient
+
+-- | On a machine that is very busy, an answer may take seconds.
+patient :: RosOptions
+patient = defaultRosOptions {noServerAfter = 15, patience = 15, pongWithin = 15}
+
+-- | A mission whose link is a real websocket.
+onSocketWith :: RosOptions -> (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
+onSocketWith options script act =
+  withFakeRobot [("/carry", script)] $ \robot ->
+    bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
+      port <- socketPort listening
+      -- (The server is there until the mission has ended, cleanup included.)
+      servedBy (serving robot listening) $
+        withRosWith options (rosbridge ("ws://127.0.0.1:" ++ show port)) (act robot)
+
+-- | A server that passes on what the fake robot's own bridge says.
+serving :: FakeRobot -> Socket -> Behavior a
+serving robot listening = scoped $ \nursery -> forever $ do
+  (socket, _) <- accept listening
+  fork nursery (void (tryAny (serve socket)) `finally` close socket)
+ where
+  serve socket = connecting (fakeRos robot) 1000000 (pure ()) $ \inside -> do
+    outside <- Websockets.makePendingConnection socket Websockets.defaultConnectionOptions >>= Websockets.acceptRequest
+    firstOf . map tryAny $
+      [ forever (Websockets.receiveData outside >>= sendFrame inside)
+      , forever (receiveFrame inside >>= Websockets.sendTextData outside)
+      ] :: Behavior (Either SomeException ())
