@@ -4,7 +4,7 @@ module Sim.ExploreSpaceSpec (spec) where
 
 import Control.Concurrent (mkWeakThreadId, myThreadId)
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
-import Control.Exception (uninterruptibleMask_)
+import Control.Exception (evaluate, uninterruptibleMask_)
 import Control.Monad (void, when)
 import Data.Foldable (for_)
 import Data.IORef
@@ -46,12 +46,14 @@ spec = guarded . describe "In constant memory run" $ do
     it "were abandoned" . keepsNone $ \here ->
       timeout 1 (abandoning 1 (uninterruptibleMask_ (here >> sleep 7200))) ? pure ()
 
--- | The behaviour calls its argument in one thread.
+-- | The behaviour calls its argument in one thread. (The texts of events are made when they are needed, and keep what
+-- they are made of until then.)
 keepsNone :: (Behavior () -> Behavior a) -> Expectation
 keepsNone behavior = do
   threads <- newIORef []
   ran <- simulate . behavior $
     myThreadId >>= mkWeakThreadId >>= \thread -> modifyIORef' threads (thread :)
+  _ <- evaluate (length (show (events ran)))
   performMajorGC
   left <- readIORef threads >>= traverse deRefWeak
   map isJust left `shouldBe` [False]

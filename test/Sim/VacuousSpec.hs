@@ -53,6 +53,10 @@ worlds = do
     world `shouldRecord` exactly 1 (successOf "drive")
     map entryTime . recordEntries <$> happened world `shouldReturn` [0, 0, 4]
     reading low `shouldThrow` saying "only read its record"
+  it "cannot be followed in a simulation through a signal that is shared outside" $ do
+    (_, _, low) <- rover
+    run <- Signal.withShared (signal low) (simulate . Signal.waitUntil)
+    explain (outcome run) `shouldSatisfy` ("opened outside of this simulation" `isInfixOf`)
   it "is one that was not used at all, of which no claim is made" $ do
     (world, drive, _) <- rover
     void (simulate (pure () ? drive))

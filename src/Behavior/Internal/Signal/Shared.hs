@@ -9,10 +9,12 @@ module Behavior.Internal.Signal.Shared
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (ErrorCall (..), finally)
-import Control.Monad (when)
+import Control.Exception (ErrorCall (..), finally, throwIO)
+import Control.Monad (unless, when)
 
 import Behavior.Internal.Concurrent.Scope
+import Behavior.Internal.Core.Backend (Simulator (runNumber))
+import Behavior.Internal.Core.Dispatch (simulator)
 import Behavior.Internal.Core.Failure (Behavior)
 import Behavior.Internal.Seam.Runtime
 import Behavior.Internal.Signal.Source
@@ -29,7 +31,8 @@ import Behavior.Internal.Signal.Source
 -- with the behaviour's: a cleanup must not wait for them. An operator inside decides on a
 -- reading that began after the operator did, and so waits for the next slot, up to a period.
 -- Everything that the behaviour throws is thrown. Outside the behaviour the shared signal is
--- closed: opening it there is a fault, an 'ErrorCall'.
+-- closed: opening it there is a fault, an 'ErrorCall', and so is opening it in a simulation that runs inside of the
+-- behaviour.
 --
 -- >>> import Data.IORef
 -- >>> count <- newIORef (0 :: Int)
@@ -42,14 +45,17 @@ withShared :: Signal a -> (Signal a -> Behavior b) -> Behavior b
 withShared signal body = do
   -- (A consumer that reads the times of readings may come later.)
   source <- open signal everyValue {readingTimes = True}
+  run <- thisRun
   closed <- newTVarIO False
   -- It is closed only when everything has ended: a thread that is still stopping may be reading
   -- it.
-  structured "withShared" (sharing source closed) `finally` atomically (writeTVar closed True)
+  structured "withShared" (sharing source run closed) `finally` atomically (writeTVar closed True)
  where
-  sharing source closed scope = do
+  sharing source run closed scope = do
     sensors <- newEmptyTMVarIO
     let shared = Signal $ \_ -> do
+          here <- thisRun
+          unless (here == run) (throwIO elsewhere)
           running <- atomically (stillOpen >> readTMVar sensors)
           let orSensorError value = stillOpen >> sensorError running >>= maybe value throwSTM
           pure source {workers = [], view = mapView orSensorError <$> view source}
@@ -59,4 +65,10 @@ withShared signal body = do
     (_, running) <- startSensors scope source
     atomically (putTMVar sensors running)
     endedBy "body" <$> atomically (outcome main)
+  -- The number of the simulation that the thread is part of.
+  thisRun = fmap runNumber <$> simulator
+  elsewhere =
+    ErrorCall
+      "withShared: the shared signal was opened outside of this simulation, whose behaviours cannot follow it; open it \
+      \inside: simulate (withShared ...)"
   closedError = ErrorCall "withShared: the shared signal was used outside its behaviour"
