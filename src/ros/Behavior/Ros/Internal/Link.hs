@@ -166,7 +166,7 @@ comeUp ros time = do
     [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
       ++ [Subscribe (statusOf action) "action_msgs/msg/GoalStatusArray" | action <- moving]
 
--- | The link is down, and why. What waits for an answer is told at once, and what was not sent yet never will be.
+-- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is never sent.
 goDown :: Ros -> String -> STM ()
 goDown ros why = do
   l <- readTVar (link ros)
