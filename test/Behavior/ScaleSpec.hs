@@ -78,14 +78,12 @@ filters =
     , ("changes", Signal.changes)
     ]
 
--- | For the second size the work is at most the given number of times that for the first. (Of five pairs of
--- measurements the least ratio counts: what else the machine does meanwhile makes the work of either size seem more.)
+-- | For the second size the work is at most the given number of times that for the first. (The least of five
+-- measurements counts for each, taken in turn: so what else the machine does meanwhile affects both.)
 takesAtMost :: Integral work => (Int, Int) -> Double -> (Int -> IO work) -> Expectation
 takesAtMost (few, many) times work = do
-  ratios <- replicateM 5 (ratio <$> work few <*> work many)
-  minimum ratios `shouldSatisfy` (< times)
- where
-  ratio less more = fromIntegral more / fromIntegral less :: Double
+  (less, more) <- unzip <$> replicateM 5 ((,) <$> work few <*> work many)
+  fromIntegral (minimum more) / fromIntegral (minimum less) `shouldSatisfy` (< times)
 
 -- | The nanoseconds of processor time that the process has used while the action ran, but for garbage collection, whose
 -- share depends on what else the machine does.

@@ -166,7 +166,8 @@ comeUp ros time = do
     [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
       ++ [Subscribe (statusOf action) "action_msgs/msg/GoalStatusArray" | action <- moving]
 
--- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is never sent.
+-- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is
+-- never sent.
 goDown :: Ros -> String -> STM ()
 goDown ros why = do
   l <- readTVar (link ros)
