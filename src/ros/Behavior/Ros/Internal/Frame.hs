@@ -24,6 +24,7 @@ module Behavior.Ros.Internal.Frame
 import Control.Monad (when)
 import Data.Aeson (Object, Value (..), eitherDecode', encode, object, withObject, (.!=), (.:), (.:?), (.=))
 import Data.Aeson.Types (Parser, parseEither)
+import Data.Bifunctor (first)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Text (Text)
 
@@ -123,5 +124,6 @@ decodeFrame limits fields frame = do
   -- Before it is parsed: a parser needs hundreds of bytes for each bracket.
   when (nestsDeeperThan (mostDepth limits) frame) . Left $
     "a frame that nests deeper than " ++ show (mostDepth limits)
-  value <- eitherDecode' frame
-  parseEither (withObject "a frame" (\o -> o .: "op" >>= fields o)) value
+  value <- first ("a frame that is no JSON: " ++) (eitherDecode' frame)
+  first ("a frame that rosbridge does not have: " ++) $
+    parseEither (withObject "a frame" (\o -> o .: "op" >>= fields o)) value
