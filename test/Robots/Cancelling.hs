@@ -1,0 +1,60 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- Rows 2, 3 and 4: goals that are cancelled.
+module Robots.Cancelling
+  ( atRandomInstants
+  , atOnce
+  , neverConfirmed
+  ) where
+
+import Control.Monad (replicateM_, unless, void)
+import Data.Aeson ((.=))
+
+import Behavior
+import Behavior.Internal.Seam.Runtime (liveThreadCount)
+import Behavior.Ros
+import Behavior.Ros.Action
+import qualified Behavior.Signal as Signal
+import Robots.Goals
+import Robots.Stage
+
+-- | Cancelled at random instants, half of them on a server that looks every 10 ms, half on one that looks every 150.
+atRandomInstants :: Stage -> Behavior ()
+atRandomInstants stage = withBridge stage 9090 $ \_ bridge -> withRos bridge $ \ros -> do
+  awaitServers stage 2 bridge ["/fast", "/slow"]
+  let n = if isLong stage then 500 else 200
+      some name = replicateM_ n $ do
+        instant <- somewhere 0.01 0.3
+        void $ interrupted stage 2 [("server", name)] (sleep instant) (plainly ros (fibonacci name))
+  some "/fast" `both` some "/slow"
+
+-- | Cancelled within a millisecond of being sent, a hundred on each server. (Some are later, for threads wait for the
+-- processor: they are not counted.)
+atOnce :: Stage -> Behavior ()
+atOnce stage = withBridge stage 9090 $ \_ bridge -> withRos bridge $ \ros -> do
+  awaitServers stage 3 bridge ["/fast", "/slow"]
+  let some n name = unless (n == 0) $ do
+        instant <- somewhere 0 0.0005
+        let isSent = Signal.waitUntil ((> 0) <$> movingGoals ros)
+        begun <- clock
+        stopped <- interrupted stage 3 [("server", name)] (isSent >> sleep instant) (plainly ros (fibonacci name))
+        some (if any (<= begun + 0.001) stopped then n - 1 else n) name
+  some (100 :: Int) "/fast"
+  some 100 "/slow"
+
+-- | A server that never confirms: it works on each goal to its end.
+neverConfirmed :: Stage -> Behavior ()
+neverConfirmed stage = withBridge stage 9090 $ \_ bridge -> replicateM_ (if isLong stage then 10 else 2) $ do
+  awaitServers stage 4 bridge ["/stubborn"]
+  before <- liveThreadCount
+  withRos bridge $ \ros -> do
+    let which = fibonacci "/stubborn"
+        stopped kind = void . interrupted stage 4 [("kind", kind)] (sleep 0.3)
+    stopped "first" (plainly ros which)
+    stopped "refused" (plainly ros which)
+    stopped "replacing" (plainly ros (replacing which))
+    within 20 "the end of the goals" ((== 0) <$> movingGoals ros)
+    stopped "afterwards" (plainly ros which)
+  after <- liveThreadCount
+  note stage 4 ["threads before" .= before, "threads after" .= after]

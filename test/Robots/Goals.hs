@@ -1,0 +1,99 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- Goals of which the program writes what it believes about them.
+module Robots.Goals
+  ( fibonacci
+  , Sending
+  , plainly
+  , untilFeedback
+  , believing
+  , interrupted
+  , awaitServers
+  ) where
+
+import Control.Exception (SomeAsyncException, SomeException, displayException, fromException, throwIO, try)
+import Control.Monad (unless, void, when)
+import Data.Aeson (Value, object, (.=))
+import qualified Data.Aeson.Key as Key
+import Data.Foldable (for_)
+import Data.IORef
+import Data.Maybe (isJust)
+import Data.Text (Text)
+
+import Behavior
+import Behavior.Parallel (firstOf)
+import Behavior.Ros
+import Behavior.Ros.Action
+import Behavior.STM
+import qualified Behavior.Signal as Signal
+import Behavior.Time (timeout)
+import Robots.Stage
+
+-- | The action of the servers.
+fibonacci :: String -> Action Value
+fibonacci name = untyped name "test_msgs/action/Fibonacci"
+
+-- | Sends a goal with that order.
+type Sending = Int -> Behavior Value
+
+plainly :: Ros -> Action Value -> Sending
+plainly ros which order = goal ros which (object ["order" .= order])
+
+-- | The behaviour runs when the goal's server works on it.
+untilFeedback :: Ros -> Action Value -> Behavior () -> Sending
+untilFeedback ros which act order =
+  goalWith ros which (object ["order" .= order]) $ \feedback -> Signal.waitUntil (True <$ feedback) >> act
+
+-- | Sends a goal with an order of its own, and writes when that was, when its stop was requested, when and how it
+-- ended, and what it gave. What it throws is thrown.
+believing :: Stage -> Row -> [(Text, String)] -> IORef (Maybe Double) -> Sending -> Behavior ()
+believing stage row more stopAt send = do
+  order <- newOrder stage
+  begun <- clock
+  how <- try (send order)
+  ended <- clock
+  stopped <- readIORef stopAt
+  note stage row $
+    ["order" .= order, "begun" .= begun, "stop" .= stopped, "ended" .= ended, "outcome" .= outcome how]
+      ++ ["result" .= result | Right result <- [how]]
+      ++ ["why" .= displayException why | Left why <- [how]]
+      ++ [Key.fromText name .= value | (name, value) <- more]
+  either throwIO (const (pure ())) how
+
+-- | What a goal's end is called there.
+outcome :: Either SomeException a -> String
+outcome how = case how of
+  Right _ -> "completed"
+  Left why
+    | Just fault <- fromException why -> head (words (show (fault :: RosFault)))
+    | Just failure <- fromException why -> head (words (show (failure :: RosFailure)))
+    | isJust (fromException why :: Maybe SomeAsyncException) -> "stopped"
+    | otherwise -> "other"
+
+-- | Sends a goal whose stop is requested when the behaviour has ended: gives when that was. (Whatever the goal throws
+-- is only written.)
+interrupted :: Stage -> Row -> [(Text, String)] -> Behavior () -> Sending -> Behavior (Maybe Double)
+interrupted stage row more until send = do
+  stopAt <- newIORef Nothing
+  void . tryAny $
+    firstOf [believing stage row more stopAt send, until >> clock >>= writeIORef stopAt . Just]
+  readIORef stopAt
+
+-- | Waits until goals reach these servers over the bridge: one that has just started loses them. (They are sent over a
+-- link of their own, and their orders are not written.)
+awaitServers :: Stage -> Row -> Transport -> [String] -> Behavior ()
+awaitServers stage row bridge names =
+  withRosWith defaultRosOptions {patience = 0.1} bridge $ \ros -> for_ names $ \name -> do
+    reached <- newTVarIO False
+    let reach = atomically (writeTVar reached True)
+        go n = do
+          order <- newOrder stage
+          _ <- tryAny . timeout 0.3 $ firstOf
+            [ void (untilFeedback ros (replacing (fibonacci name)) reach order)
+            , atomically (readTVar reached >>= check)
+            ]
+          there <- readTVarIO reached
+          unless there (if n < 50 then go (n + 1) else failWith ("no goal reaches " ++ name))
+          when there (note stage row ["server" .= name, "lost by the bridge" .= (n - 1 :: Int)])
+    go 1

@@ -1,0 +1,130 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- What the rows have in common: what the program believes is written to a file, in lines of JSON, which
+-- @test/robots/judge.py@ compares with what the action servers have recorded; and bridges, which can be killed.
+module Robots.Stage
+  ( -- * What the program believes
+    Stage (..)
+  , newStage
+  , Row
+  , note
+  , clock
+  , newOrder
+
+    -- * Bridges
+  , Bridge
+  , onPort
+  , withBridge
+  , startBridge
+  , awaitBridge
+  , signalBridge
+  , endBridge
+
+    -- * Numbers and limits
+  , somewhere
+  , within
+  ) where
+
+import Control.Concurrent.MVar
+import Control.Exception (bracket)
+import Control.Monad ((>=>))
+import Data.Aeson (encode, object, (.=))
+import Data.Aeson.Types (Pair)
+import qualified Data.ByteString.Lazy.Char8 as Bytes
+import Data.Foldable (traverse_)
+import Data.IORef
+import GHC.Clock (getMonotonicTime)
+import System.Environment (getEnv, lookupEnv)
+import System.IO
+import System.Posix.Signals (Signal, sigCONT, sigKILL, signalProcess)
+import System.Process
+import Test.QuickCheck (choose, generate)
+
+import Behavior
+import Behavior.Ros
+import qualified Behavior.Signal as Signal
+import Behavior.Time (timeout)
+
+-- | Where everything is written, and how a bridge is started.
+data Stage = Stage
+  { believed :: MVar Handle
+  , orders :: IORef Int
+  , command :: [String]
+  , folder :: FilePath
+  , isLong :: Bool
+  }
+
+-- | From the environment: @ROBOTS@ is the folder, @ROBOTS_BRIDGE@ the command that starts a bridge, and @LONG@ is set
+-- for the long counts.
+newStage :: IO Stage
+newStage = do
+  place <- getEnv "ROBOTS"
+  handle <- openFile (place ++ "/believed") WriteMode
+  hSetBuffering handle LineBuffering
+  Stage <$> newMVar handle <*> newIORef 0 <*> (words <$> getEnv "ROBOTS_BRIDGE") <*> pure place <*> longCounts
+ where
+  longCounts = maybe False (not . null) <$> lookupEnv "LONG"
+
+-- | A row of the table.
+type Row = Int
+
+-- | Writes a line.
+note :: Stage -> Row -> [Pair] -> IO ()
+note stage row pairs =
+  withMVar (believed stage) $ \h -> Bytes.hPutStrLn h (encode (object (("row" .= row) : pairs)))
+
+-- | CLOCK_MONOTONIC, which the servers read, too.
+clock :: IO Double
+clock = getMonotonicTime
+
+-- | An order that no other goal has.
+newOrder :: Stage -> IO Int
+newOrder stage = atomicModifyIORef' (orders stage) (\n -> (n + 1, n + 1))
+
+-- | A bridge, which may be killed and started again.
+data Bridge = Bridge
+  { onPort :: Int
+  , running :: IORef (Maybe ProcessHandle)
+  }
+
+-- | A bridge on that port while the behaviour runs.
+withBridge :: Stage -> Int -> (Bridge -> Transport -> Behavior a) -> Behavior a
+withBridge stage port use =
+  bracket (Bridge port <$> newIORef Nothing) (endBridge sigKILL) $ \bridge -> do
+    startBridge stage bridge
+    use bridge (rosbridge ("ws://127.0.0.1:" ++ show port))
+
+-- | Starts it. (It is there some 0.2 s later.)
+startBridge :: Stage -> Bridge -> IO ()
+startBridge stage bridge = do
+  output <- openFile (folder stage ++ "/bridge-" ++ show (onPort bridge)) AppendMode
+  let (program, arguments) = (head (command stage), tail (command stage) ++ ["--bind", address])
+      address = "127.0.0.1:" ++ show (onPort bridge)
+  (_, _, _, process) <-
+    createProcess (proc program arguments) {std_in = NoStream, std_out = UseHandle output, std_err = UseHandle output}
+  writeIORef (running bridge) (Just process)
+
+-- | Waits until there is a link.
+awaitBridge :: Ros -> Behavior ()
+awaitBridge ros = within 10 "a link" (linkUp ros)
+
+signalBridge :: Signal -> Bridge -> IO ()
+signalBridge signal bridge =
+  readIORef (running bridge) >>= traverse_ (getPid >=> traverse_ (signalProcess signal))
+
+-- | Sends it that signal, and waits until it has ended. (One that is stopped goes on.)
+endBridge :: Signal -> Bridge -> IO ()
+endBridge signal bridge = do
+  signalBridge signal bridge
+  signalBridge sigCONT bridge
+  readIORef (running bridge) >>= traverse_ waitForProcess
+  writeIORef (running bridge) Nothing
+
+-- | A random time between two.
+somewhere :: Double -> Double -> IO Seconds
+somewhere low high = realToFrac <$> generate (choose (low, high))
+
+-- | Waits for what has to come, and does not wait forever.
+within :: Seconds -> String -> Signal.Signal Bool -> Behavior ()
+within seconds what condition = timeout seconds (Signal.waitUntil condition) ? failWith ("it did not come: " ++ what)
