@@ -59,7 +59,9 @@ sourceSteps steps receive = go
     WithWatchdog w source ->
       inside t (WithWatchdog w) source
         ++ [(l, t', WithWatchdog w' source) | (l, t', w') <- watchdogSteps t w source]
-    _ -> []
+    Watching _ -> []
+    Deadline _ -> []
+    SharedSource -> []
   inside t around source = [(l, t', around source') | (l, t', source') <- go t source]
 
 pollerSteps

@@ -108,7 +108,9 @@ startSource t = \case
     inner = startSource t source
   WithWatchdog w source ->
     WithWatchdog (notOverdue w) {watchdogRequest = NoRequest, watchdogState = NoReading} (startSource t source)
-  other -> other
+  Watching condition -> Watching condition
+  Deadline end -> Deadline end
+  SharedSource -> SharedSource
  where
   workerFor inner = Worker {request = NoRequest, view = viewOf t inner}
   notOverdue w = w {overdue = overdue w + overdue w `mod` 2}
@@ -122,8 +124,11 @@ viewOf t = \case
   Debounced _ source -> viewOf t source
   Throttled _ source -> viewOf t source
   WithWatchdog w source -> After (overdue w) (viewOf t source)
-  SharedSource | s : outer <- shared t -> viewOf t {shared = outer} s
-  _ -> Always
+  SharedSource -> case shared t of
+    s : outer -> viewOf t {shared = outer} s
+    [] -> Always
+  Watching _ -> Always
+  Deadline _ -> Always
 
 -- * Reading
 
@@ -131,35 +136,39 @@ viewOf t = \case
 -- the reader acts on the value, a hysteresis keeps the new state. 'Nothing': there is no
 -- value yet.
 readSource :: Now -> ReadMode -> View -> Source -> Maybe (Either Result (Int, Now, Source))
-readSource t mode v source = case (source, v) of
-  (Watching condition, _) -> case (Map.lookup condition (levels t), mode) of
+readSource t mode v source = case source of
+  Watching condition -> case (Map.lookup condition (levels t), mode) of
     (Just (At n), _) -> gives n
     (Just Failing, _) -> wrong (FailedWith condition)
     (Just Faulting, _) -> wrong (FaultedWith condition)
     (_, FirstRead) -> Nothing
     (_, Reread) -> wrong (FailedWith noValue)
-  (Deadline end, _) -> gives (fromEnum (clock t >= end))
-  (Polling s, After n _) -> case newest s of
-    Just (k, result) | k > n -> case result of
-      Succeeded value -> gives (number value)
-      other -> wrong other
-    _ -> Nothing
-  (Joined how sources, Each views) -> joined how [] t (zip views sources)
-  (WithHysteresis m inner, _) -> inside v inner $ \n t' inner' ->
+  Deadline end -> gives (fromEnum (clock t >= end))
+  Polling s
+    | After n _ <- v, Just (k, result) <- newest s, k > n -> case result of
+        Succeeded value -> gives (number value)
+        other -> wrong other
+    | otherwise -> Nothing
+  Joined how sources
+    | Each views <- v -> joined how [] t (zip views sources)
+    | otherwise -> Nothing
+  WithHysteresis m inner -> inside v inner $ \n t' inner' ->
     let after = n >= high m || (isHigh m && n > low m)
      in found (fromEnum after) t' (WithHysteresis m {isHigh = after} inner')
-  (Debounced d inner, _) -> inside v inner $ \_ t' inner' ->
+  Debounced d inner -> inside v inner $ \_ t' inner' ->
     settled d >>= \n -> found n t' (Debounced d inner')
-  (Throttled h inner, _) -> inside v inner $ \_ t' inner' ->
+  Throttled h inner -> inside v inner $ \_ t' inner' ->
     passed h >>= \n -> found n t' (Throttled h inner')
-  (WithWatchdog w inner, After n v')
-    | odd (overdue w) || overdue w > n -> wrong (FailedWith (overdueBy (limit w)))
-    | otherwise -> inside v' inner $ \m t' inner' -> found m t' (WithWatchdog w inner')
+  WithWatchdog w inner
+    | After n _ <- v, odd (overdue w) || overdue w > n -> wrong (FailedWith (overdueBy (limit w)))
+    | After _ v' <- v -> inside v' inner $ \m t' inner' -> found m t' (WithWatchdog w inner')
+    | otherwise -> Nothing
   -- If a poller of the shared source has died, the reading fails, whatever the value is.
-  (SharedSource, _) | s : outer <- shared t -> case deadPollers s of
-    dead : _ -> wrong dead
-    [] -> readInner t {shared = outer} v s $ \n t' s' -> found n t' {shared = s' : shared t'} SharedSource
-  _ -> Nothing
+  SharedSource
+    | s : outer <- shared t -> case deadPollers s of
+        dead : _ -> wrong dead
+        [] -> readInner t {shared = outer} v s $ \n t' s' -> found n t' {shared = s' : shared t'} SharedSource
+    | otherwise -> Nothing
  where
   gives n = found n t source
   found n t' source' = Just (Right (n, t', source'))
@@ -182,15 +191,23 @@ readSource t mode v source = case (source, v) of
 oldestReading :: Now -> Source -> Maybe Ticks
 oldestReading t = \case
   Polling s -> inFlightSince s
-  Joined _ sources -> case mapMaybe (oldestReading t) sources of
+  SharedSource | s : outer <- shared t -> oldestReading t {shared = outer} s
+  source -> case mapMaybe (oldestReading t) (madeOf source) of
     [] -> Nothing
     since -> Just (minimum since)
-  WithHysteresis _ source -> oldestReading t source
-  Debounced _ source -> oldestReading t source
-  Throttled _ source -> oldestReading t source
-  WithWatchdog _ source -> oldestReading t source
-  SharedSource | s : outer <- shared t -> oldestReading t {shared = outer} s
-  _ -> Nothing
+
+-- | The sources that it is made of, from left to right.
+madeOf :: Source -> [Source]
+madeOf = \case
+  Joined _ sources -> sources
+  WithHysteresis _ source -> [source]
+  Debounced _ source -> [source]
+  Throttled _ source -> [source]
+  WithWatchdog _ source -> [source]
+  Polling _ -> []
+  Watching _ -> []
+  Deadline _ -> []
+  SharedSource -> []
 
 -- * Stopping
 
@@ -209,7 +226,9 @@ requestStopOfSource = \case
     Throttled h {throttleWorker = requestStopOfWorker (throttleWorker h)} (requestStopOfSource source)
   WithWatchdog w source ->
     WithWatchdog w {watchdogRequest = withStop (watchdogRequest w)} (requestStopOfSource source)
-  other -> other
+  Watching condition -> Watching condition
+  Deadline end -> Deadline end
+  SharedSource -> SharedSource
  where
   requestStopOfWorker w = w {request = withStop (request w)}
   withStop = \case
@@ -226,18 +245,15 @@ allStopped = \case
   Debounced d source -> request (changeWorker d) == Received && timer d == Received && allStopped source
   Throttled h source -> request (throttleWorker h) == Received && allStopped source
   WithWatchdog w source -> watchdogRequest w == Received && allStopped source
-  _ -> True
+  Watching _ -> True
+  Deadline _ -> True
+  SharedSource -> True
 
 -- | How the pollers of a source have ended, from left to right.
 pollerEnds :: Source -> [Result]
 pollerEnds = \case
   Polling Poller {poll = PollEnded result} -> [result]
-  Joined _ sources -> concatMap pollerEnds sources
-  WithHysteresis _ source -> pollerEnds source
-  Debounced _ source -> pollerEnds source
-  Throttled _ source -> pollerEnds source
-  WithWatchdog _ source -> pollerEnds source
-  _ -> []
+  source -> concatMap pollerEnds (madeOf source)
 
 -- | The failures and faults with which pollers of a source have ended.
 deadPollers :: Source -> [Result]
@@ -260,12 +276,7 @@ remaining = Joined AllHold . pollers
     s@(Polling Poller {poll = PollEnded (FaultedWith _)}) -> [s]
     Polling Poller {poll = PollEnded _} -> []
     s@(Polling _) -> [s]
-    Joined _ sources -> concatMap pollers sources
-    WithHysteresis _ source -> pollers source
-    Debounced _ source -> pollers source
-    Throttled _ source -> pollers source
-    WithWatchdog _ source -> pollers source
-    _ -> []
+    source -> concatMap pollers (madeOf source)
 
 noSource :: Source
 noSource = Joined AllHold []

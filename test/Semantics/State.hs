@@ -296,19 +296,31 @@ dueTimes = \case
   Changing [] end -> [end]
   Called _ r (Change at _ _ : _) _ -> at : dueTimes r
   Called _ r [] stopTimes -> take 1 stopTimes ++ dueTimes r
-  _ -> []
+  -- These are due at no time.
+  Starting _ -> []
+  Opening _ -> []
+  Calling _ _ -> []
+  Forking _ _ -> []
+  Forked _ -> []
+  Entering _ -> []
+  Delivering -> []
+  Taking _ _ -> []
+  Returning _ -> []
+  Over _ -> []
  where
   ofThreads threads = concat [dueTimes r | Thread _ (Live _ r) <- threads]
   ofSource = \case
     Deadline end -> [end]
     Polling Poller {poll = BetweenSlots due} -> [due]
     Polling Poller {poll = Reading r} -> dueTimes r
+    Polling _ -> []
     Joined _ sources -> concatMap ofSource sources
     WithHysteresis _ source -> ofSource source
     Debounced d source -> [since + delay d | Just (_, since) <- [timedChange d]] ++ ofSource source
     Throttled h source -> maybeToList (restsUntil h) ++ ofSource source
     WithWatchdog w source -> [since + limit w | InFlight since <- [watchdogState w]] ++ ofSource source
-    _ -> []
+    Watching _ -> []
+    SharedSource -> []
 
 -- | The effect of the passing of time: all threads have started, and every stop request has
 -- reached its thread, where it is pending if it cannot be received.
@@ -330,7 +342,23 @@ afterTimePassed = \case
   Sharing source body -> Sharing (ofSource source) (threadAfter body)
   Concluding operator result source threads -> Concluding operator result (ofSource source) (map threadAfter threads)
   Called requests r coming stopTimes -> Called (requestAfter requests) (afterTimePassed r) coming stopTimes
-  r -> r
+  -- In these no other thread runs.
+  r@(Starting _) -> r
+  r@(Opening _) -> r
+  r@(Calling _ _) -> r
+  r@Acting {} -> r
+  r@Cleaning {} -> r
+  r@(CleaningInterruptibly _ _) -> r
+  r@(Forking _ _) -> r
+  r@(Forked _) -> r
+  r@(Sleeping _) -> r
+  r@AwaitingSlot {} -> r
+  r@(Entering _) -> r
+  r@Delivering -> r
+  r@(Taking _ _) -> r
+  r@(Changing _ _) -> r
+  r@(Returning _) -> r
+  r@(Over _) -> r
  where
   ofPhase = \case
     Following value branch -> Following value (threadAfter branch)
@@ -339,12 +367,15 @@ afterTimePassed = \case
     phase -> phase
   ofSource = \case
     Polling s@Poller {poll = Reading r} -> Polling s {poll = Reading (afterTimePassed r)}
+    Polling s -> Polling s
     Joined how sources -> Joined how (map ofSource sources)
     WithHysteresis m source -> WithHysteresis m (ofSource source)
     Debounced d source -> Debounced d (ofSource source)
     Throttled h source -> Throttled h (ofSource source)
     WithWatchdog w source -> WithWatchdog w (ofSource source)
-    source -> source
+    Watching condition -> Watching condition
+    Deadline end -> Deadline end
+    SharedSource -> SharedSource
 
 -- | The same for a thread, and for the stop requests of one.
 threadAfter :: Thread -> Thread

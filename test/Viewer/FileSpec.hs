@@ -26,6 +26,7 @@ import Behavior.Trace.Format (decodeEvent)
 import Behavior.Trace.Recording (recording, withoutOperators)
 import Behavior.Trace.Summary (renderSummary, summary)
 import Behavior.Trace.Svg (timeline)
+import Behavior.Trace.TraceEvents (renderTraceEvents)
 import Behavior.Trace.Tree (renderTree)
 import Viewer.Examples
 import Viewer.Generate
@@ -217,6 +218,7 @@ spec = do
                 , renderSummary (summary r)
                 , renderDifference (difference r r)
                 , Text.unpack (timeline r)
+                , Text.unpack (Text.decodeUtf8 (renderTraceEvents r))
                 , concatMap plainLine events
                 ]
              where
