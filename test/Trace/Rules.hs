@@ -392,7 +392,8 @@ causes x =
           (_, TimeLimit limit) -> case itsProgram >>= timeLimit of
             Just n ->
               let isLate (_, _, _, t, _) = t >= realToFrac (spanBegan o) + fromIntegral n
-               in limit == fromIntegral n && maybe False isLate (Map.lookup (spanNumber s) (over x))
+               in -- (It may not have ended: a run is cut off at some time.)
+                  limit == fromIntegral n && maybe (not (complete x)) isLate (Map.lookup (spanNumber s) (over x))
             _ -> False
           (op, _)
             | op `notElem` ["parallel", "firstOf", "both", "allOf", "decide", "scoped", "withShared"] -> case cause of
