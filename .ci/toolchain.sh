@@ -25,6 +25,7 @@ libraries=(
   aeson:libghc-aeson-dev
   ansi-terminal:libghc-ansi-terminal-dev
   async:libghc-async-dev
+  base64-bytestring:libghc-base64-bytestring-dev
   hspec:libghc-hspec-dev
   HUnit:libghc-hunit-dev
   network:libghc-network-dev

@@ -9,8 +9,10 @@ import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ScaleSpec
 import qualified Behavior.SpaceSpec
 import qualified Promises.PromisesSimSpec
+import qualified Ros.CallSpec
 import qualified Ros.GoalSpec
 import qualified Ros.LinkSpec
+import qualified Ros.MessagesSpec
 import qualified Ros.TopicSpec
 import qualified SemanticsSpec
 import qualified Sim.ExploreSpaceSpec
@@ -28,6 +30,8 @@ main = hspec $ do
     Ros.GoalSpec.spec
     Ros.TopicSpec.spec
     Ros.LinkSpec.spec
+    Ros.CallSpec.spec
+    Ros.MessagesSpec.spec
   describe "Many schedules" Sim.ExploreSpaceSpec.spec
   describe "Space" $ do
     Behavior.SpaceSpec.spec

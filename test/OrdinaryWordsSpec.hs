@@ -3,7 +3,7 @@
 -- |
 -- The names that a program has of its own, beside open imports of all public modules: that this module compiles is
 -- the test. A public module that took one of these words would make each use of it here an ambiguous one, which is
--- an error. ("Behavior.Signal" is imported qualified.)
+-- an error. ("Behavior.Signal" and "Behavior.Ros.Messages.Geometry" are imported qualified.)
 --
 -- These ordinary words are taken: they are the language and the words of its tests, so a program that imports the
 -- module openly has to avoid them, or to hide them.
@@ -11,10 +11,12 @@
 -- * "Behavior": attempt, both, failed, fallback, monitor, parallel, sleep
 -- * "Behavior.Message": dropped, receive, unhandled
 -- * "Behavior.Parallel": await, decide, fork, pinned, scoped
--- * "Behavior.Ros": entry, latched, latest, measured, patience, topic
+-- * "Behavior.Ros": call, entry, latched, latest, measured, patience, publication, publishing, service, topic
 -- * "Behavior.Ros.Action": action, goal, replacing, untyped
--- * "Behavior.Ros.Fake": publish, seen, succeeding
--- * "Behavior.Ros.Messages": charging, percentage, voltage
+-- * "Behavior.Ros.Fake": answering, publish, seen, succeeding
+-- * "Behavior.Ros.Messages": stamp
+-- * "Behavior.Ros.Messages.Navigation": pose, to
+-- * "Behavior.Ros.Messages.Sensor": charging, intensities, nearest, percentage, ranges, voltage
 -- * "Behavior.STM": check, retry, and what else stm exports
 -- * "Behavior.Time": checkpoint, every, now, timeout
 -- * "Behavior.Trace": adopt, named
@@ -34,6 +36,10 @@ import Behavior.Ros
 import Behavior.Ros.Action hiding (goal)
 import Behavior.Ros.Fake
 import Behavior.Ros.Messages
+import qualified Behavior.Ros.Messages.Geometry as Geometry
+import Behavior.Ros.Messages.Navigation
+import Behavior.Ros.Messages.Sensor
+import Behavior.Ros.Messages.Test
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
@@ -59,7 +65,7 @@ spec = Hspec.it "leaves a hundred ordinary words to the programs that import its
 
 ordinaryWords :: [String]
 ordinaryWords =
-  [ angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begins, box, brake, call, camera,
+  [ angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begins, box, brake, camera,
     cancel, capacity, cargo, charge, close, color, command, complete, config, contents, count, current, defaults,
     depth, describe, detailed, did, direction, distance, dock, door, drive, duration, end, ends, entries, failing,
     failures, field, find, format, forward, frame, from, front, full, goal, grasp, gripper, group, handle, heading,
@@ -73,7 +79,7 @@ ordinaryWords =
     update, value, velocity, version, wait, wall, watch, weight, what, wheel, who, width, world, zone
   ]
 
-angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begins, box, brake, call, camera, cancel,
+angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begins, box, brake, camera, cancel,
   capacity, cargo, charge, close, color, command, complete, config, contents, count, current, defaults, depth,
   describe, detailed, did, direction, distance, dock, door, drive, duration, end, ends, entries, failing, failures,
   field, find, format, forward, frame, from, front, full, goal, grasp, gripper, group, handle, heading, height, home,
@@ -87,7 +93,7 @@ angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begi
   wall, watch, weight, what, wheel, who, width, world, zone :: String
 angle = "angle"; area = "area"; argument = "argument"; arm = "arm"; arrived = "arrived"; at = "at"; axis = "axis"
 back = "back"; base = "base"; battery = "battery"; beacon = "beacon"; begins = "begins"; box = "box"; brake = "brake"
-call = "call"; camera = "camera"; cancel = "cancel"; capacity = "capacity"; cargo = "cargo"; charge = "charge"
+camera = "camera"; cancel = "cancel"; capacity = "capacity"; cargo = "cargo"; charge = "charge"
 close = "close"; color = "color"; command = "command"; complete = "complete"; config = "config"; contents = "contents"
 count = "count"; current = "current"; defaults = "defaults"; depth = "depth"; describe = "describe"
 detailed = "detailed"; did = "did"; direction = "direction"; distance = "distance"; dock = "dock"; door = "door"

@@ -38,8 +38,8 @@ spec = guarded $ do
         subscriptions robot >>= (`shouldBe` [0, 1])
     it "that falls silent is a fault after the expected silence" . underSchedules 150 . withRobot $ \robot ros -> do
       awaitUp ros
-      let publishing = sequence_ [charge robot (Just 0.5) >> sleep 1 | _ <- [1 .. 4 :: Int]] >> sleepForever
-      firstOf [publishing, inSeconds 5 (tried (deciding ros))] >>= (`shouldBe` Left silent)
+      let charges = sequence_ [charge robot (Just 0.5) >> sleep 1 | _ <- [1 .. 4 :: Int]] >> sleepForever
+      firstOf [charges, inSeconds 5 (tried (deciding ros))] >>= (`shouldBe` Left silent)
     it "is no fault as long as a message comes within the expected silence" . underSchedules 40 . withRobot $
       \robot ros ->
         sequence_ [charge robot (Just 0.5) >> sleep 1.9 | _ <- [1 .. 10 :: Int]] ||| deciding ros

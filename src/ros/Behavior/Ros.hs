@@ -15,6 +15,7 @@ module Behavior.Ros
     Ros
   , withRos
   , linkUp
+  , inNamespace
 
     -- ** The way to the robot
   , Transport
@@ -32,12 +33,37 @@ module Behavior.Ros
   , Silence
   , atLeastEvery
   , latched
+  , upToBytes
   , latest
   , measured
+  , withMessages
+
+    -- * Publishing
+  , Publication
+  , publication
+  , untypedPublication
+  , keepingLast
+  , publishing
+
+    -- * Services
+  , RosService (..)
+  , Service
+  , service
+  , untypedService
+  , call
+
+    -- * Parameters
+  , ParameterValue (..)
+  , getParameter
+  , setParameter
+
+    -- * Time
+  , rosTime
 
     -- * Messages
   , RosMessage (..)
   , entry
+  , entryOr
 
     -- * What goes wrong
   , RosFailure (..)
@@ -46,11 +72,15 @@ module Behavior.Ros
   , refusedFrames
   ) where
 
+import Behavior.Ros.Internal.Call
+import Behavior.Ros.Internal.Clock
 import Behavior.Ros.Internal.Error
 import Behavior.Ros.Internal.Keeper
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Parameter
+import Behavior.Ros.Internal.Publication
 import Behavior.Ros.Internal.Topic
 import Behavior.Ros.Internal.Transport
 import Behavior.Ros.Internal.Websocket

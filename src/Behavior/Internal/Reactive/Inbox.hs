@@ -13,6 +13,7 @@ module Behavior.Internal.Reactive.Inbox
   , onMessage
   , messageRule
   , handleNext
+  , deliver
   , receive
   , unhandled
   , dropped

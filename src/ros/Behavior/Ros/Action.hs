@@ -24,6 +24,10 @@ module Behavior.Ros.Action
     -- * Goals
   , goal
   , goalWith
+
+    -- * In an emergency
+  , stopAll
   ) where
 
 import Behavior.Ros.Internal.Goal
+import Behavior.Ros.Internal.StopAll

@@ -22,6 +22,11 @@ module Behavior.Ros.Fake
   , GoalEnd (..)
   , succeeding
 
+    -- * Its services
+  , ServiceScript (..)
+  , answering
+  , offerService
+
     -- * What a test does with it
   , publish
   , sendBytes
@@ -35,6 +40,7 @@ module Behavior.Ros.Fake
   , runningGoals
   ) where
 
+import Behavior.Ros.Internal.FakeBridge
 import Behavior.Ros.Internal.FakeRobot
 import Behavior.Ros.Internal.FakeScript
 

@@ -26,6 +26,10 @@ data RosFailure
     Aborted String String
   | -- | The goal was cancelled, and not by us.
     CancelledByOther String
+  | -- | This service could not answer; its reason.
+    ServiceFailed String String
+  | -- | This service did not answer within that time. What it was asked to do it may still do.
+    TooSlow String Seconds
   | -- | A goal of ours may still run on this action: see "Behavior.Ros.Action". Nothing was sent.
     StillMoving String
   deriving (Eq, Show)
@@ -38,6 +42,8 @@ instance Exception RosFailure where
     Rejected action why -> action ++ " rejected the goal: " ++ why
     Aborted action why -> action ++ " aborted the goal: " ++ why
     CancelledByOther action -> "the goal of " ++ action ++ " was cancelled, and not by us"
+    ServiceFailed service why -> service ++ " failed: " ++ why
+    TooSlow service seconds -> service ++ " has not answered within " ++ show seconds ++ " s"
     StillMoving action -> "a goal of ours may still run on " ++ action ++ ": nothing was sent"
 
 -- | The link or a program of the robot is not as it should be. These are faults: no operator swallows one.

@@ -9,6 +9,8 @@ module Behavior.Ros.Internal.FakeScript
     GoalScript (..)
   , GoalEnd (..)
   , succeeding
+  , ServiceScript (..)
+  , answering
 
     -- * What it has done
   , Seen (..)
@@ -66,6 +68,22 @@ succeeding =
     , feedbacks = []
     }
 
+-- | What a service does with a request.
+--
+-- @since 0.1.0.0
+data ServiceScript = ServiceScript
+  { answersAfter :: Seconds
+  -- ^ How long it takes; infinite if it never answers.
+  , answersWith :: Either Value Value
+  -- ^ Its answer, or (on the left) why it could not.
+  }
+
+-- | Answers every request with an empty message, after that time.
+--
+-- @since 0.1.0.0
+answering :: Seconds -> Value -> ServiceScript
+answering time _ = ServiceScript time (Right (object []))
+
 -- | What the robot has seen and done: an independent record of what the program has made it do. Goals are numbered
 -- from 1, in the order in which they came.
 --
@@ -75,6 +93,14 @@ data Seen
     Connected
   | -- | It has subscribed to this topic.
     Subscribed String
+  | -- | The program will publish on this topic.
+    Advertised String
+  | -- | It no longer will.
+    Unadvertised String
+  | -- | It has published this message.
+    Published String Value
+  | -- | It has called this service.
+    Called String Value
   | -- | The goal with this number came for this action.
     GoalCame Int String
   | -- | A cancel of it came; whether it could have an effect.

@@ -18,6 +18,7 @@ module Behavior.Ros.Internal.Frame
 
     -- * Limits
   , Limits (..)
+  , tooLarge
   , Id
   ) where
 
@@ -41,6 +42,12 @@ data Request
   | -- | Action, type, goal.
     SendGoal Id Text Text Value
   | CancelGoal Id Text
+  | -- | Topic, type, and whether the bridge is to keep the last message for new subscribers.
+    Advertise Text Text Bool
+  | Unadvertise Text
+  | Publish Text Value
+  | -- | Service, type (empty: the one that the service has), request.
+    CallService Id Text Text Value
   deriving (Eq, Show)
 
 -- | A frame from the bridge.
@@ -49,6 +56,8 @@ data Answer
   | Feedback Id Value
   | -- | The status of the goal: 4 succeeded, 5 cancelled, 6 aborted, 0 it was never accepted.
     Result Id Int Value
+  | -- | The answer of a service, and whether it could answer.
+    Response Id Bool Value
   | -- | What the bridge complains about, and of which request.
     Complaint (Maybe Id) Text
   | -- | One that we do not use.
@@ -76,8 +85,15 @@ encodeRequest request = encode . object $ case request of
     , "feedback" .= True
     ]
   CancelGoal n action -> ["op" .= op "cancel_action_goal", "id" .= n, "action" .= action]
+  Advertise t type' latch ->
+    ["op" .= op "advertise", "id" .= advertisement t, "topic" .= t, "type" .= type', "latch" .= latch]
+  Unadvertise t -> ["op" .= op "unadvertise", "id" .= advertisement t, "topic" .= t]
+  Publish t message -> ["op" .= op "publish", "topic" .= t, "msg" .= message]
+  CallService n service type' arguments ->
+    ["op" .= op "call_service", "id" .= n, "service" .= service, "args" .= arguments] ++ ["type" .= type' | type' /= ""]
  where
   subscription t = "subscription of " <> t
+  advertisement t = "advertisement of " <> t
 
 -- | How a bridge reads it.
 decodeRequest :: Limits -> Bytes.ByteString -> Either String Request
@@ -86,6 +102,10 @@ decodeRequest limits = decodeFrame limits $ \o name -> case name of
   "unsubscribe" -> Unsubscribe <$> o .: "topic"
   "send_action_goal" -> SendGoal <$> o .: "id" <*> o .: "action" <*> o .: "action_type" <*> o .:? "args" .!= Null
   "cancel_action_goal" -> CancelGoal <$> o .: "id" <*> o .: "action"
+  "advertise" -> Advertise <$> o .: "topic" <*> o .: "type" <*> o .:? "latch" .!= False
+  "unadvertise" -> Unadvertise <$> o .: "topic"
+  "publish" -> Publish <$> o .: "topic" <*> o .: "msg"
+  "call_service" -> CallService <$> o .: "id" <*> o .: "service" <*> o .:? "type" .!= "" <*> o .:? "args" .!= Null
   _ -> fail ("no request: op " ++ show name)
 
 -- | The frame of a bridge.
@@ -96,6 +116,7 @@ encodeAnswer answer = encode . object $ case answer of
   -- (The field "result" of a cancelled goal is true for one bridge, and false for another. Here it is true.)
   Result n status values ->
     ["op" .= op "action_result", "id" .= n, "status" .= status, "values" .= values, "result" .= (status /= 6)]
+  Response n can values -> ["op" .= op "service_response", "id" .= n, "values" .= values, "result" .= can]
   Complaint n why -> ["op" .= op "status", "level" .= op "error", "msg" .= why] ++ ["id" .= i | Just i <- [n]]
   Other name -> ["op" .= name]
 
@@ -112,6 +133,7 @@ decodeAnswer limits = decodeFrame limits $ \o name -> case name of
     status <- o .: "status"
     when (status `notElem` [0, 4, 5, 6 :: Int]) $ fail ("a result with the status " ++ show status)
     Result <$> o .: "id" <*> pure status <*> o .:? "values" .!= Null
+  "service_response" -> Response <$> o .: "id" <*> o .: "result" <*> o .:? "values" .!= Null
   "status" -> do
     level <- o .:? "level" .!= "error"
     if level == op "error" then Complaint <$> o .:? "id" <*> o .:? "msg" .!= "" else pure (Other name)
@@ -119,11 +141,15 @@ decodeAnswer limits = decodeFrame limits $ \o name -> case name of
 
 decodeFrame :: Limits -> (Object -> Text -> Parser a) -> Bytes.ByteString -> Either String a
 decodeFrame limits fields frame = do
-  when (Bytes.length frame > fromIntegral (mostBytes limits)) . Left $
-    "a frame of " ++ show (Bytes.length frame) ++ " bytes; allowed: " ++ show (mostBytes limits)
+  let bytes = fromIntegral (Bytes.length frame)
+  when (bytes > mostBytes limits) (Left (tooLarge bytes (mostBytes limits)))
   -- Before it is parsed: a parser needs hundreds of bytes for each bracket.
   when (nestsDeeperThan (mostDepth limits) frame) . Left $
     "a frame that nests deeper than " ++ show (mostDepth limits)
   value <- first ("a frame that is no JSON: " ++) (eitherDecode' frame)
   first ("a frame that rosbridge does not have: " ++) $
     parseEither (withObject "a frame" (\o -> o .: "op" >>= fields o)) value
+
+-- | What is said of a frame with this number of bytes, and of how many are allowed.
+tooLarge :: Int -> Int -> String
+tooLarge bytes allowed = "a frame of " ++ show bytes ++ " bytes; allowed: " ++ show allowed

@@ -16,6 +16,7 @@ module Behavior.Ros.Internal.Goal
   , action
   , untyped
   , replacing
+  , nameIn
 
     -- * Goals
   , goal
@@ -25,14 +26,11 @@ module Behavior.Ros.Internal.Goal
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, mask, throwIO, try)
 import Control.Monad (unless, when)
-import Data.Aeson (Value (String), encode)
-import qualified Data.ByteString.Lazy as Bytes
+import Data.Aeson (Value)
 import qualified Data.Map.Strict as Map
 import Data.Proxy (Proxy (..))
 import Data.Text (Text)
 import qualified Data.Text as Text
-import Data.Text.Encoding (decodeUtf8With)
-import Data.Text.Encoding.Error (lenientDecode)
 
 import Behavior (Behavior, (?))
 import Behavior.Parallel (firstOf)
@@ -95,7 +93,7 @@ data Action a = Action
   , preempts :: Bool
   }
 
--- | The action with that name (a robot's namespace is a part of it).
+-- | The action with that name.
 --
 -- > navigate = action "/navigate" :: Action PlanAndRun
 --
@@ -148,7 +146,7 @@ replacing which = which {preempts = True}
 --
 -- @since 0.1.0.0
 goal :: RosAction a => Ros -> Action a -> Goal a -> Behavior (Result a)
-goal ros which wanted = newTVarIO Nothing >>= sendGoal ros which wanted
+goal ros which wanted = newTVarIO Nothing >>= sendGoal ros (resolved ros which) wanted
 
 -- | 'goal' with a behaviour beside it, which is given the goal's feedback. If that behaviour fails or faults, the
 -- goal is stopped, and that is thrown; if it returns, the goal goes on.
@@ -163,9 +161,19 @@ goalWith :: RosAction a => Ros -> Action a -> Goal a -> (Signal (Feedback a) -> 
 goalWith ros which wanted beside = do
   latest <- newTVarIO Nothing
   firstOf
-    [ sendGoal ros which wanted latest
-    , beside (watching (readTVar latest >>= maybe retry (expected which))) >> sleepForever
+    [ sendGoal ros there wanted latest
+    , beside (watching (readTVar latest >>= maybe retry (expected there))) >> sleepForever
     ]
+ where
+  there = resolved ros which
+
+-- | The action with its whole name.
+resolved :: Ros -> Action a -> Action a
+resolved ros which = which {nameOf = nameIn ros which}
+
+-- | The whole name of the action.
+nameIn :: Ros -> Action a -> Text
+nameIn ros = absolute ros . nameOf
 
 -- | What came from this action.
 expected :: RosMessage b => Action a -> Value -> STM b
@@ -173,18 +181,13 @@ expected which = either (throwSTM . Undecodable (Text.unpack (nameOf which))) pu
 
 sendGoal :: RosAction a => Ros -> Action a -> Goal a -> TVar (Maybe Value) -> Behavior (Result a)
 sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore -> do
-  (n, running) <- send restore
+  -- (It is registered and handed over in one transaction: no interruption comes between.)
+  (n, running) <- handOver ros restore (start ros which (toRos wanted) latest)
   try (restore (atomically (awaitEnd running))) >>= \case
     Right how -> atomically (conclude how)
     Left stop -> confirmation ros which n running >>= maybe (throwIO (NotConfirmed name)) (afterStop stop)
  where
   name = Text.unpack (nameOf which)
-  -- It is registered and handed over in one transaction: no interruption comes between.
-  send restore = do
-    restore (awaitLink ros)
-    started <- atomically ((Just <$> start ros which (toRos wanted) latest) `orElse` (Nothing <$ whenDown))
-    maybe (send restore) pure started
-  whenDown = readTVar (link ros) >>= check . not . isUp
   conclude how = case how of
     Ended 4 values -> expected which values
     Ended 5 _ -> throwSTM (CancelledByOther name)
@@ -198,19 +201,12 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore ->
     Lost -> atomically (conclude how)
     _ -> throwIO (stop :: SomeException)
 
--- | What a server says about a goal that it has not done.
-textOf :: Value -> String
-textOf said = case said of
-  String text -> Text.unpack text
-  _ -> Text.unpack (decodeUtf8With lenientDecode (Bytes.toStrict (encode said)))
-
 -- | Registers the goal, and hands it to the writer.
 start :: Ros -> Action a -> Value -> TVar (Maybe Value) -> STM (Text, Sent)
 start ros which wanted latest = do
   before <- mayRun ros (nameOf which)
   when (before && not (preempts which)) $ throwSTM (StillMoving (Text.unpack (nameOf which)))
-  n <- readTVar (nextGoal ros)
-  writeTVar (nextGoal ros) $! n + 1
+  n <- newNumber ros
   connection <- connections <$> readTVar (link ros)
   running <- Sent (nameOf which) connection <$> newTVar Nothing <*> newTVar False <*> pure latest
   let name = "goal " <> Text.pack (show n)

@@ -12,6 +12,7 @@ module Behavior.Ros.Internal.Keeper
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), finally, throwIO)
 import Control.Monad (forever)
+import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (for_, traverse_)
 import Prelude hiding (take)
 
@@ -21,6 +22,7 @@ import Behavior.Parallel (firstOf)
 import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Receive
 import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
 import Behavior.STM (atomically)
@@ -62,11 +64,13 @@ withRos = withRosWith defaultRosOptions
 -- @since 0.1.0.0
 withRosWith :: RosOptions -> Transport -> (Ros -> Behavior a) -> Behavior a
 withRosWith options transport behavior = do
-  for_ [noServerAfter, patience, pingEvery, pongWithin, firstPause, longestPause] (duration "withRosWith" . ($ options))
+  for_ durations (duration "withRosWith" . ($ options))
   traverse_ (throwIO . ErrorCall) (refusal transport)
   ros <- newRos (address transport) options
   servedBy (keeping ros transport) (firstOf [behavior ros, reporting ros])
     `finally` atomically (goDown ros "its withRos has ended" >> modifyTVar' (link ros) (\l -> l {isClosed = True}))
+ where
+  durations = [noServerAfter, patience, tooSlowAfter, pingEvery, pongWithin, firstPause, longestPause]
 
 -- | Passes on the lines about what was refused.
 reporting :: Ros -> Behavior a
@@ -116,11 +120,12 @@ receivedAny ros = modifyTVar' (received ros) (+ 1)
 reading :: Ros -> Connection -> Behavior a
 reading ros connection = forever $ do
   frame <- receiveFrame connection
-  case decodeAnswer (Limits (frameBytes options) (frameDepth options)) frame of
+  most <- readTVarIO (largestFrame ros)
+  case decodeAnswer (Limits most (frameDepth (rosOptions ros))) frame of
     Left why -> atomically (receivedAny ros >> refuse ros why)
-    Right answer -> now >>= \time -> atomically (receivedAny ros >> take ros time answer)
- where
-  options = rosOptions ros
+    Right answer -> do
+      time <- now
+      atomically (receivedAny ros >> take ros time (fromIntegral (Bytes.length frame)) answer)
 
 -- | Writes these requests first. (A ping goes before all that wait.)
 writing :: Ros -> Connection -> [Request] -> Behavior a

@@ -1,6 +1,6 @@
 {-# OPTIONS_HADDOCK not-home #-}
-{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE OverloadedStrings #-}
+{-# LANGUAGE RankNTypes #-}
 
 -- |
 -- What is known of a link: whether it is up, what was sent over it, and what came. (The threads that use it are in
@@ -20,24 +20,31 @@ module Behavior.Ros.Internal.Link
   , comeUp
   , goDown
   , awaitLink
+  , handOver
   , ask
+  , Advertised (..)
+
+    -- * Names and numbers
+  , inNamespace
+  , absolute
+  , newNumber
 
     -- * What came
   , Kept (..)
   , Arrival (..)
   , keptOf
+  , wantBytes
   , Sent (..)
   , End (..)
+  , Reply (..)
   , mayRun
   , movingGoals
-  , take
-  , refuse
+  , endWith
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (unless, void, when)
-import Data.Aeson (Object, Value, withObject, (.:))
-import Data.Aeson.Types (parseEither)
+import Data.Aeson (Value)
 import Data.Foldable (for_, traverse_)
 import Data.List (nub)
 import Data.Map.Strict (Map)
@@ -45,7 +52,6 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (isNothing)
 import Data.Text (Text)
 import qualified Data.Text as Text
-import Prelude hiding (take)
 
 import Behavior (Behavior, Seconds, (?))
 import Behavior.Ros.Internal.Error
@@ -68,11 +74,20 @@ data Ros = Ros
   , pingWanted :: TVar Bool
   , received :: TVar Int
   -- ^ How often anything was received.
-  , nextGoal :: TVar Int
+  , nextNumber :: TVar Int
+  -- ^ Of goals, calls and receivers.
   , kept :: TVar (Map Text Kept)
   -- ^ The topics that were subscribed to, for as long as the link is used.
   , sent :: TVar (Map Id Sent)
   -- ^ The goals that may still run.
+  , calls :: TVar (Map Id (TVar (Maybe Reply)))
+  -- ^ The calls that wait for their answer.
+  , advertised :: TVar (Map Text Advertised)
+  -- ^ The topics on which the program publishes.
+  , namespace :: Text
+  -- ^ Of relative names.
+  , largestFrame :: TVar Int
+  -- ^ How many bytes a frame has at most, whatever it is.
   , refused :: TVar Int
   , reports :: TBQueue String
   }
@@ -95,7 +110,15 @@ data Kept = Kept
   , askedAt :: TVar Seconds
   -- ^ When it was last subscribed to.
   , keptType :: Text
+  , receivers :: TVar (Map Int (Value -> STM ()))
+  -- ^ What else takes each message.
+  , bytesWanted :: TVar Int
+  -- ^ How many bytes a message of this topic has at most.
   }
+
+-- | A topic on which the program publishes: its type, whether the bridge keeps the last message, and how many
+-- publishers there are.
+data Advertised = Advertised !Text !Bool !Int
 
 -- | A message that came: its number, and when that was.
 data Arrival = Arrival
@@ -122,6 +145,12 @@ data End
   | Complained Text
   | Lost
 
+-- | What a service has answered.
+data Reply
+  = Answered Value
+  | Refused Value
+  | NoReply
+
 -- | A link that is down.
 newRos :: String -> RosOptions -> IO Ros
 newRos name options =
@@ -133,8 +162,30 @@ newRos name options =
     <*> newTVarIO 1
     <*> newTVarIO Map.empty
     <*> newTVarIO Map.empty
+    <*> newTVarIO Map.empty
+    <*> newTVarIO Map.empty
+    <*> pure ""
+    <*> newTVarIO (frameBytes options)
     <*> newTVarIO 0
     <*> newTBQueueIO 64
+
+-- | The link, for names of a robot: a topic, action, service or node whose name does not begin with a slash is in this
+-- namespace.
+--
+-- > driveTo room = goal (inNamespace "/robot1" ros) navigate (to room)     -- navigate = action "navigate"
+--
+-- Namespaces nest: one without a slash at its beginning is in that of the link. What is used through both is the
+-- same: one connection, one subscription to each topic.
+--
+-- @since 0.1.0.0
+inNamespace :: String -> Ros -> Ros
+inNamespace name ros = ros {namespace = absolute ros (Text.pack name)}
+
+-- | The name with its namespace.
+absolute :: Ros -> Text -> Text
+absolute ros name
+  | "/" `Text.isPrefixOf` name = name
+  | otherwise = Text.dropWhileEnd (== '/') (namespace ros) <> "/" <> name
 
 -- | Whether there is a link. It never fails.
 --
@@ -161,9 +212,11 @@ comeUp ros time = do
   modifyTVar' (link ros) (\l -> l {isUp = True, connections = connections l + 1})
   topics <- readTVar (kept ros)
   for_ topics (\topic -> writeTVar (askedAt topic) time)
+  topicsOfOurs <- readTVar (advertised ros)
   moving <- nub . map sentTo . Map.elems <$> readTVar (sent ros)
   pure $
-    [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
+    [Advertise name type' keeps | (name, Advertised type' keeps _) <- Map.toList topicsOfOurs]
+      ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
       ++ [Subscribe (statusOf action) "action_msgs/msg/GoalStatusArray" | action <- moving]
 
 -- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is
@@ -178,6 +231,7 @@ goDown ros why = do
     readTVar (kept ros) >>= traverse_ (\topic -> writeTVar (newest topic) Nothing)
     -- (They stay among those that may still run.)
     readTVar (sent ros) >>= traverse_ (`endWith` Lost)
+    readTVar (calls ros) >>= traverse_ (`writeTVar` Just NoReply)
 
 -- | Throws if the link was lost more often than that, or is no longer used; and gives whether it is up.
 lostSince :: Ros -> Int -> STM Bool
@@ -200,11 +254,25 @@ awaitLink ros = do
     pure (isUp l)
   noServer = throwSTM (NoServer (robot ros))
 
+-- | Waits for a link, as 'awaitLink', and runs a transaction that asks the bridge. (Nothing is handed over later than
+-- that: when the link is lost before, it waits again.) To be called masked; so no interruption comes after the
+-- transaction.
+handOver :: Ros -> (forall b. Behavior b -> Behavior b) -> STM a -> Behavior a
+handOver ros restore asking = do
+  restore (awaitLink ros)
+  atomically ((Just <$> asking) `orElse` (Nothing <$ whenDown)) >>= maybe (handOver ros restore asking) pure
+ where
+  whenDown = readTVar (link ros) >>= check . not . isUp
+
 -- | Asks the bridge. Retries while too much waits to be sent, and while the link is down.
 ask :: Ros -> Request -> STM ()
 ask ros request = do
   readTVar (link ros) >>= check . isUp
   writeTBQueue (outgoing ros) request
+
+-- | A number that no other goal, call or receiver has.
+newNumber :: Ros -> STM Int
+newNumber ros = readTVar (nextNumber ros) >>= \n -> n <$ (writeTVar (nextNumber ros) $! n + 1)
 
 -- | The topic with this name, subscribed to.
 keptOf :: Ros -> Text -> Text -> Seconds -> STM Kept
@@ -212,61 +280,26 @@ keptOf ros name type' time =
   readTVar (kept ros) >>= \topics -> case Map.lookup name topics of
     Just topic -> pure topic
     Nothing -> do
-      topic <- Kept <$> newTVar Nothing <*> newTVar 0 <*> newTVar time <*> pure type'
+      topic <-
+        Kept <$> newTVar Nothing <*> newTVar 0 <*> newTVar time <*> pure type' <*> newTVar Map.empty <*> newTVar 0
       writeTVar (kept ros) (Map.insert name topic topics)
       l <- readTVar (link ros)
       when (isUp l) (ask ros (Subscribe name type'))
       pure topic
 
+-- | Messages of the topic may have the given number of bytes, from now on.
+wantBytes :: Ros -> Kept -> Int -> STM ()
+wantBytes ros known bytes = do
+  modifyTVar' (bytesWanted known) (max bytes)
+  modifyTVar' (largestFrame ros) (max bytes)
+
 -- | Whether a goal of ours may still run on this action.
 mayRun :: Ros -> Text -> STM Bool
 mayRun ros action = any ((== action) . sentTo) <$> readTVar (sent ros)
 
--- | Takes what came from the bridge at this time.
-take :: Ros -> Seconds -> Answer -> STM ()
-take ros time answer = case answer of
-  Message name value -> do
-    topic <- Map.lookup name <$> readTVar (kept ros)
-    for_ topic $ \known -> do
-      n <- (+ 1) <$> readTVar (arrivals known)
-      writeTVar (arrivals known) n
-      writeTVar (newest known) (Just (Arrival n time value))
-    traverse_ (`takeStatus` value) (Text.stripSuffix "/_action/status" name)
-  -- By its id: the result of another goal, which may come late, is not taken for that of this one.
-  Result n status values -> goal n >>= traverse_ (\known -> known `endWith` Ended status values >> forget n)
-  Feedback n values -> goal n >>= traverse_ (\known -> writeTVar (feedback known) (Just values))
-  Complaint (Just n) why ->
-    goal n >>= \case
-      Nothing -> report ros ("the bridge complains: " ++ Text.unpack why)
-      Just known ->
-        -- (It may be about a cancel that came too early, and the goal goes on.)
-        readTVar (cancelled known) >>= \is -> unless is (known `endWith` Complained why >> forget n)
-  Complaint Nothing why -> report ros ("the bridge complains: " ++ Text.unpack why)
-  Other _ -> pure ()
- where
-  goal n = Map.lookup n <$> readTVar (sent ros)
-  forget n = modifyTVar' (sent ros) (Map.delete n)
-  -- Goals that were sent in this connection may not have reached their server yet.
-  takeStatus action value = case parseEither anyRuns value of
-    Left why -> refuse ros why
-    Right True -> pure ()
-    Right False -> do
-      current <- connections <$> readTVar (link ros)
-      modifyTVar' (sent ros) (Map.filter (\known -> sentTo known /= action || sentIn known == current))
-  anyRuns = withObject "GoalStatusArray" $ \o -> do
-    goals <- o .: "status_list"
-    any (`notElem` [4, 5, 6 :: Int]) <$> traverse (.: "status") (goals :: [Object])
-
 -- | Ends the goal, unless it has ended.
 endWith :: Sent -> End -> STM ()
 endWith known how = readTVar (end known) >>= \before -> when (isNothing before) (writeTVar (end known) (Just how))
-
--- | Counts a frame that was refused, and reports why.
-refuse :: Ros -> String -> STM ()
-refuse ros why = modifyTVar' (refused ros) (+ 1) >> report ros ("refused: " ++ why)
-
-report :: Ros -> String -> STM ()
-report ros line = isFullTBQueue (reports ros) >>= \full -> unless full (writeTBQueue (reports ros) line)
 
 statusOf :: Text -> Text
 statusOf action = action <> "/_action/status"

@@ -9,16 +9,25 @@
 module Behavior.Ros.Internal.Message
   ( RosMessage (..)
   , entry
+  , entryOr
   , decoded
+  , textOf
   ) where
 
-import Data.Aeson (FromJSON, Object, Value (..), parseJSON, toJSON)
+import Data.Aeson (FromJSON, Object, Value (..), encode, parseJSON, toJSON)
 import qualified Data.Aeson.Key as Key
-import Data.Aeson.Types (Parser, explicitParseField, parseEither)
+import Data.Aeson.Types (Parser, explicitParseField, explicitParseFieldMaybe', parseEither)
+import qualified Data.ByteString.Lazy as Bytes
 import Data.Int (Int16, Int32, Int64, Int8)
+import Data.Maybe (fromMaybe)
 import Data.Proxy (Proxy)
 import Data.Text (Text)
+import qualified Data.Text as Text
+import Data.Text.Encoding (decodeUtf8With)
+import Data.Text.Encoding.Error (lenientDecode)
 import Data.Word (Word16, Word32, Word64, Word8)
+
+import Behavior (Seconds)
 
 -- | A type of messages, or of a part of one.
 --
@@ -52,9 +61,22 @@ class RosMessage a where
 entry :: RosMessage a => Object -> Text -> Parser a
 entry o = explicitParseField fromRos o . Key.fromText
 
+-- | The entry of a message with that name, or this value where the message has no such entry. (Definitions of messages
+-- grow from one distribution of ROS to the next.)
+--
+-- @since 0.1.0.0
+entryOr :: RosMessage a => a -> Object -> Text -> Parser a
+entryOr absent o name = fromMaybe absent <$> explicitParseFieldMaybe' fromRos o (Key.fromText name)
+
 -- | What it is, or why it is not.
 decoded :: RosMessage a => Value -> Either String a
 decoded = parseEither fromRos
+
+-- | What a server says about what it has not done.
+textOf :: Value -> String
+textOf said = case said of
+  String text -> Text.unpack text
+  _ -> Text.unpack (decodeUtf8With lenientDecode (Bytes.toStrict (encode said)))
 
 instance RosMessage Value where
   fromRos = pure
@@ -71,6 +93,11 @@ instance RosMessage Double where
     Null -> fail "null for a number (a number that may be null is a Maybe Double)"
     _ -> fail "this is no number"
   toRos x = if isNaN x || isInfinite x then Null else toJSON x
+
+-- | A duration that is a number. (Most of ROS's durations have two parts: 'Behavior.Ros.Messages.Time'.)
+instance RosMessage Seconds where
+  fromRos value = realToFrac <$> (fromRos value :: Parser Double)
+  toRos s = toRos (realToFrac s :: Double)
 
 -- | Nothing is null.
 instance RosMessage a => RosMessage (Maybe a) where

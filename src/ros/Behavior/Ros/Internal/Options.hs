@@ -16,15 +16,18 @@ import Behavior (Behavior, Seconds)
 -- @since 0.1.0.0
 data RosOptions = RosOptions
   { noServerAfter :: Seconds
-  -- ^ How long a goal or signal waits for a link; 5 s by default.
+  -- ^ How long what is used waits for a link; 5 s by default.
   , patience :: Seconds
   -- ^ How long a goal that is stopped waits for the robot's confirmation; 2 s by default.
+  , tooSlowAfter :: Seconds
+  -- ^ How long a call waits for the service's answer; 5 s by default.
   , pingEvery :: Seconds
   -- ^ How often the bridge is asked whether it is there; 1 s by default.
   , pongWithin :: Seconds
   -- ^ How long anything may take to come after that, or the link is lost; 1 s by default.
   , frameBytes :: Int
-  -- ^ How many bytes a frame from the bridge has at most, or it is refused; 1 MiB by default.
+  -- ^ How many bytes a frame from the bridge has at most, or it is refused; 1 MiB by default. (For the messages of
+  -- one topic: 'Behavior.Ros.upToBytes'.)
   , frameDepth :: Int
   -- ^ How deep the brackets in a frame nest at most, or it is refused; 64 by default.
   , firstPause :: Seconds
@@ -44,6 +47,7 @@ defaultRosOptions =
   RosOptions
     { noServerAfter = 5
     , patience = 2
+    , tooSlowAfter = 5
     , pingEvery = 1
     , pongWithin = 1
     , frameBytes = 1048576

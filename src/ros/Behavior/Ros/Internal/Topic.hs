@@ -13,16 +13,21 @@ module Behavior.Ros.Internal.Topic
   , Silence
   , atLeastEvery
   , latched
+  , upToBytes
 
-    -- * Their signals
+    -- * What comes on them
   , latest
+  , withMessages
+  , subscribed
   , measured
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (SomeException, toException)
+import Control.Exception (SomeException, bracket_, throw, toException)
 import Control.Monad (join, void, when)
+import Data.Aeson (Value)
 import Data.Foldable (traverse_)
+import qualified Data.Map.Strict as Map
 import Data.Maybe (isNothing)
 import Data.Proxy (Proxy (..))
 import Data.Text (Text)
@@ -30,28 +35,40 @@ import qualified Data.Text as Text
 
 import Behavior (Behavior, Seconds, tryAny)
 import Behavior.Internal.Core.Seconds (period)
+import Behavior.Internal.Reactive.Inbox (Inbox, deliver, withInbox)
 import Behavior.Internal.Signal.Source
+import Behavior.Parallel (firstOf)
 import Behavior.Ros.Internal.Error
 import Behavior.Ros.Internal.Frame (Request (..))
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
 import Behavior.STM (atomically)
-import Behavior.Time (now, sleepUntil)
+import Behavior.Signal (waitUntil)
+import Behavior.Time (now, sleepForever, sleepUntil)
 
 -- $setup
 -- >>> import Behavior
+-- >>> import Behavior.Message (receive)
 -- >>> import Behavior.Ros
 -- >>> import Behavior.Ros.Fake
 -- >>> import Behavior.Ros.Messages
+-- >>> import Behavior.Ros.Messages.Sensor
+-- >>> import Behavior.STM (atomically)
 -- >>> import Behavior.Sim (simulate)
 -- >>> import qualified Behavior.Signal as Signal
 -- >>> import Behavior.Time (now)
--- >>> import Control.Monad (void)
+-- >>> import Control.Monad (replicateM_, void)
+-- >>> import Data.Foldable (traverse_)
+-- >>> import Data.Text (Text, pack)
 
 -- | A robot's topic, and how long it may be silent.
 --
 -- @since 0.1.0.0
-data Topic a = Topic Text Silence
+data Topic a = Topic
+  { topicName :: Text
+  , mayBeSilent :: Seconds
+  , atMostBytes :: Int
+  }
 
 -- | How long a topic may be silent: 'atLeastEvery', or 'latched'.
 --
@@ -72,14 +89,24 @@ atLeastEvery = Silence
 latched :: Silence
 latched = Silence (1 / 0)
 
--- | The topic with that name (a robot's namespace is a part of it), and its expected silence. Without that a robot
+-- | The topic with that name, and its expected silence. Without that a robot
 -- whose sensor has died would be one whose battery is full: so there is no default.
 --
 -- > battery = topic "/battery_state" (atLeastEvery 2) :: Topic BatteryState
 --
 -- @since 0.1.0.0
 topic :: String -> Silence -> Topic a
-topic = Topic . Text.pack
+topic name (Silence silence) = Topic (Text.pack name) silence 0
+
+-- | The same topic, whose messages have at most that many bytes: for those that are larger than
+-- 'Behavior.Ros.frameBytes' (images, maps). One that is larger still is refused, as if it had not come. (A frame of
+-- more than 20,000,000 bytes ends the connection, unless 'Behavior.Ros.frameBytes' is more.)
+--
+-- > map = upToBytes 8000000 (topic "/map" latched)
+--
+-- @since 0.1.0.0
+upToBytes :: Int -> Topic a -> Topic a
+upToBytes bytes which = which {atMostBytes = bytes}
 
 -- | The latest message of a topic.
 --
@@ -108,15 +135,16 @@ topic = Topic . Text.pack
 --
 -- @since 0.1.0.0
 latest :: forall a. RosMessage a => Ros -> Topic a -> Signal a
-latest ros (Topic name (Silence silence)) = Signal $ \_ -> do
+latest ros which = Signal $ \_ -> do
   _ <- period ("latest " ++ Text.unpack name) silence
-  time <- now
-  known <- atomically (keptOf ros name (messageType (Proxy :: Proxy a)) time)
+  known <- subscribed ros which
   judged <- newTVarIO Unjudged
   pure
     (fromView (viewing known judged))
       {workers = [Worker "silence" (const (watchSilence ros name silence known judged) <$ writeTVar judged Unjudged)]}
  where
+  name = absolute ros (topicName which)
+  silence = mayBeSilent which
   viewing known judged = do
     before <- losses <$> readTVar (link ros)
     pure . constantView $ do
@@ -129,6 +157,52 @@ latest ros (Topic name (Silence silence)) = Signal $ \_ -> do
             Just arrival | arrivalNumber arrival >= n -> either undecodable pure (decoded (arrived arrival))
             _ -> retry
   undecodable = throwSTM . Undecodable (Text.unpack name)
+
+-- | Runs a behaviour with an inbox in which each message of the topic arrives once.
+--
+-- > withMessages ros orders 10 $ \inbox -> onMessage inbox (\order -> pure () <$ carryOut order) patrol
+--
+-- When more wait than there is room for, the oldest is dropped, and counted ('Behavior.Message.dropped'). What comes
+-- before the behaviour begins, and while there is no link, does not arrive (but for the last message of a publisher
+-- that keeps it). Two of them at once receive each message both.
+--
+-- [Result, failure] The behaviour's; 'NoServer', if there is no link within 'Behavior.Ros.noServerAfter'.
+-- [Fault] The behaviour's; 'LinkLost' at once when the link is lost, and 'Silent' after the topic's expected silence:
+--   both stop the behaviour. A message that is not what is expected throws 'Undecodable' where it is used.
+--   A capacity of less than 1 is refused with an 'Control.Exception.ErrorCall'.
+-- [Cancellation] Passes through.
+--
+-- >>> let orders = topic "/orders" latched :: Topic (Std Text)
+-- >>> let customer robot = traverse_ (publish robot "/orders" . toRos . Std) (map pack ["tea", "cake"])
+-- >>> :{
+-- void . simulate . withFakeRobot [] $ \robot -> withRos (fakeRos robot) $ \ros ->
+--   withMessages ros orders 10 $ \inbox -> do
+--     (sleep 1 >> customer robot) `both` replicateM_ 2 (atomically (receive inbox) >>= print)
+-- :}
+-- Std {unStd = "tea"}
+-- Std {unStd = "cake"}
+--
+-- @since 0.1.0.0
+withMessages :: RosMessage a => Ros -> Topic a -> Int -> (Inbox a -> Behavior b) -> Behavior b
+withMessages ros which capacity behavior =
+  withInbox capacity (\_ -> pure (pure ())) $ \inbox -> do
+    known <- subscribed ros which
+    n <- atomically (newNumber ros)
+    -- (It is decoded where it is used: no user's code runs in a thread of the link.)
+    let receiving = atomically (modifyTVar' (receivers known) (Map.insert n (deliver inbox . expected)))
+        ended = atomically (modifyTVar' (receivers known) (Map.delete n))
+    bracket_ receiving ended (firstOf [behavior inbox, waitUntil (False <$ latest ros untyped) >> sleepForever])
+ where
+  expected = either (throw . Undecodable (Text.unpack (topicName which))) id . decoded
+  untyped = Topic (topicName which) (mayBeSilent which) (atMostBytes which) :: Topic Value
+
+-- | The topic, subscribed to.
+subscribed :: forall a. RosMessage a => Ros -> Topic a -> Behavior Kept
+subscribed ros which = do
+  time <- now
+  atomically $ do
+    known <- keptOf ros (absolute ros (topicName which)) (messageType (Proxy :: Proxy a)) time
+    known <$ wantBytes ros known (atMostBytes which)
 
 -- | Which messages count.
 data Judged

@@ -1,0 +1,81 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- What comes from a bridge: for which topic, goal or call it is.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Ros.Internal.Receive
+  ( take
+  , refuse
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Monad (unless)
+import Data.Aeson (Object, Value (String), withObject, (.:))
+import Data.Aeson.Types (parseEither)
+import Data.Foldable (for_, toList, traverse_)
+import qualified Data.Map.Strict as Map
+import Data.Maybe (isJust)
+import qualified Data.Text as Text
+import Prelude hiding (take)
+
+import Behavior (Seconds)
+import Behavior.Ros.Internal.Frame
+import Behavior.Ros.Internal.Link
+import Behavior.Ros.Internal.Options
+
+-- | Takes what came from the bridge at this time, in a frame of this size.
+take :: Ros -> Seconds -> Int -> Answer -> STM ()
+take ros time bytes answer = do
+  allowed <- maximum . (frameBytes (rosOptions ros) :) <$> case answer of
+    Message name _ -> traverse (readTVar . bytesWanted) . toList . Map.lookup name =<< readTVar (kept ros)
+    _ -> pure []
+  if bytes > allowed then refuse ros (tooLarge bytes allowed) else takeAnswer ros time answer
+
+takeAnswer :: Ros -> Seconds -> Answer -> STM ()
+takeAnswer ros time answer = case answer of
+  Message name value -> do
+    topic <- Map.lookup name <$> readTVar (kept ros)
+    for_ topic $ \known -> do
+      n <- (+ 1) <$> readTVar (arrivals known)
+      writeTVar (arrivals known) n
+      writeTVar (newest known) (Just (Arrival n time value))
+      readTVar (receivers known) >>= traverse_ ($ value)
+    traverse_ (`takeStatus` value) (Text.stripSuffix "/_action/status" name)
+  -- By its id: the result of another goal, which may come late, is not taken for that of this one.
+  Result n status values -> goal n >>= traverse_ (\known -> known `endWith` Ended status values >> forget n)
+  Feedback n values -> goal n >>= traverse_ (\known -> writeTVar (feedback known) (Just values))
+  Response n can values -> call n >>= traverse_ (`writeTVar` Just (if can then Answered values else Refused values))
+  Complaint (Just n) why -> do
+    called <- call n
+    for_ called (`writeTVar` Just (Refused (String why)))
+    goal n >>= \case
+      Nothing -> unless (isJust called) . report ros $ "the bridge complains: " ++ Text.unpack why
+      Just known ->
+        -- (It may be about a cancel that came too early, and the goal goes on.)
+        readTVar (cancelled known) >>= \is -> unless is (known `endWith` Complained why >> forget n)
+  Complaint Nothing why -> report ros ("the bridge complains: " ++ Text.unpack why)
+  Other _ -> pure ()
+ where
+  goal n = Map.lookup n <$> readTVar (sent ros)
+  call n = Map.lookup n <$> readTVar (calls ros)
+  forget n = modifyTVar' (sent ros) (Map.delete n)
+  -- Goals that were sent in this connection may not have reached their server yet.
+  takeStatus action value = case parseEither anyRuns value of
+    Left why -> refuse ros why
+    Right True -> pure ()
+    Right False -> do
+      current <- connections <$> readTVar (link ros)
+      modifyTVar' (sent ros) (Map.filter (\known -> sentTo known /= action || sentIn known == current))
+  anyRuns = withObject "GoalStatusArray" $ \o -> do
+    goals <- o .: "status_list"
+    any (`notElem` [4, 5, 6 :: Int]) <$> traverse (.: "status") (goals :: [Object])
+
+-- | Counts a frame that was refused, and reports why.
+refuse :: Ros -> String -> STM ()
+refuse ros why = modifyTVar' (refused ros) (+ 1) >> report ros ("refused: " ++ why)
+
+report :: Ros -> String -> STM ()
+report ros line = isFullTBQueue (reports ros) >>= \full -> unless full (writeTBQueue (reports ros) line)

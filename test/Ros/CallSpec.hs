@@ -1,0 +1,155 @@
+{-# LANGUAGE OverloadedStrings #-}
+{-# LANGUAGE ScopedTypeVariables #-}
+
+-- |
+-- What a program asks of a robot besides goals: services, parameters, publishing, and stopping everything.
+module Ros.CallSpec (spec) where
+
+import Control.Exception (ErrorCall (..), try)
+import Control.Monad (void)
+import Data.Aeson (Value (..), object, (.=))
+import Data.Text (Text)
+import Test.Hspec hiding (parallel)
+
+import Behavior
+import Behavior.Parallel (allOf, firstOf)
+import Behavior.Ros
+import Behavior.Ros.Action
+import Behavior.Ros.Fake
+import Behavior.Ros.Messages
+import Behavior.STM
+import qualified Behavior.Signal as Signal
+import Behavior.Time
+import Ros.Stage
+import Support (guarded)
+
+spec :: Spec
+spec = guarded $ do
+  describe "A call" $ do
+    it "gives the answer" . withService (const (ServiceScript 0.5 (Right "on"))) $ \_ ros ->
+      inSeconds 0.5 (call ros lights "now") >>= (`shouldBe` "on")
+    it "gives each caller the answer to its own question" . withService later $ \_ ros -> do
+      let asks n = call ros lights (Number n) >>= (`shouldBe` Number n)
+      void (allOf (map asks [3, 1, 2, 1, 4]))
+    it "fails with the reason of a service that could not answer" . withService (says (Left "no bulb")) $ \_ ros ->
+      try (call ros lights Null) >>= (`shouldBe` Left (ServiceFailed "/lights" "no bulb"))
+    it "fails if there is no such service" . withService (answering 0) $ \_ ros ->
+      try (call ros (untypedService "/horn" "std_srvs/srv/Trigger") Null)
+        >>= (`shouldBe` Left (ServiceFailed "/horn" "there is no such service"))
+    it "fails if the answer is too slow, and a late answer is no other call's" . withService later $ \_ ros -> do
+      inSeconds 5 (try (call ros lights (Number 6))) >>= (`shouldBe` Left (TooSlow "/lights" 5))
+      call ros lights (Number 2) >>= (`shouldBe` Number 2)
+    it "faults if the answer is not what is expected" . withService (answering 0) $ \robot ros -> do
+      offerService robot "/arm/get_parameters" (says (Right (object ["values" .= False])))
+      end <- try (getParameter ros "/arm" "speed")
+      case end of
+        Left (Undecodable "/arm/get_parameters" _) -> pure ()
+        _ -> expectationFailure (show end)
+    it "faults at once when the link is lost" . withService (answering 3) $ \robot ros -> do
+      end <- firstOf [sleep 1 >> loseLink robot >> sleepForever, inSeconds 1 (try (call ros lights Null))]
+      end `shouldBe` Left (LinkLost "the fake robot" "user error (connection lost)")
+    it "fails when there is no link in time" . withService (answering 3) $ \robot ros -> do
+      loseLink robot
+      Signal.waitUntil (not <$> linkUp ros)
+      inSeconds 5 (try (call ros lights Null)) >>= (`shouldBe` Left (NoServer "the fake robot"))
+    it "returns at once when it is interrupted" . withService (answering 3) $ \_ ros ->
+      inSeconds 1 (stopAfter 1 (call ros lights Null)) >>= (`shouldBe` Nothing)
+
+  describe "A parameter" $ do
+    it "has its value" . withService (answering 0) $ \robot ros -> do
+      let known name = [double 0.5 | name == object ["names" .= ["speed" :: Text]]]
+      offerService robot "/arm/get_parameters" (\asked -> says (Right (object ["values" .= known asked])) asked)
+      getParameter ros "/arm" "speed" >>= (`shouldBe` DoubleValue 0.5)
+      try (getParameter ros "/arm" "reach")
+        >>= (`shouldBe` Left (ServiceFailed "/arm" "there is no parameter reach with a value"))
+    it "is set, or fails with the reason" . withService (answering 0) $ \robot ros -> do
+      let outcome ok why = object ["results" .= [object ["successful" .= ok, "reason" .= (why :: Text)]]]
+          slow = object ["parameters" .= [object ["name" .= ("speed" :: Text), "value" .= double 0.5]]]
+          judge asked = if asked == slow then outcome True "" else outcome False "too fast"
+      offerService robot "/arm/set_parameters" (\asked -> says (Right (judge asked)) asked)
+      setParameter ros "/arm" "speed" (DoubleValue 0.5)
+      try (setParameter ros "/arm" "speed" (DoubleValue 2))
+        >>= (`shouldBe` Left (ServiceFailed "/arm" "it does not set speed: too fast"))
+
+  describe "Publishing" $ do
+    it "is advertised as long as anyone publishes" . withRobot $ \robot ros -> do
+      let saying n = publishing ros speeds $ \say -> say (Std (Just n)) >> sleep 2
+      saying 1 `both` (sleep 1 >> saying 2)
+      sleep 1
+      published robot
+        >>= (`shouldBe` [(0, Advertised "/speed"), (0, said 1), (1, said 2), (3, Unadvertised "/speed")])
+    it "is advertised again after a loss of the link, and nothing is sent late" . withRobot $ \robot ros -> do
+      Signal.waitUntil (linkUp ros)
+      publishing ros speeds $ \say -> do
+        say (Std (Just 1)) >> sleep 1
+        loseLink robot
+        Signal.waitUntil (not <$> linkUp ros)
+        stopAfter 1 (say (Std (Just 2))) >>= (`shouldBe` Nothing)
+        restoreLink robot
+        say (Std (Just 3))
+      sleep 1
+      events <- map snd <$> published robot
+      events `shouldBe` [Advertised "/speed", said 1, Advertised "/speed", said 3, Unadvertised "/speed"]
+    it "fails when there is no link in time" . withRobot $ \robot ros -> do
+      loseLink robot
+      Signal.waitUntil (not <$> linkUp ros)
+      inSeconds 5 (try (publishing ros speeds ($ Std (Just 1))))
+        >>= (`shouldBe` Left (NoServer "the fake robot"))
+    it "needs a type, and only one" . withRobot $ \_ ros -> do
+      errorOf (publishing ros (publication "/x") ($ Null))
+        >>= (`shouldBe` "publishing: /x needs the name of its type (messageType, or untypedPublication)")
+      let other = untypedPublication "/speed" "std_msgs/msg/String"
+      errorOf (publishing ros speeds (\_ -> publishing ros other (\_ -> pure ())))
+        >>= (`shouldBe` "publishing: /speed is published already, as std_msgs/msg/Float64")
+
+  describe "Stopping all goals" $ do
+    it "returns when the robot says that they have ended" . mission (const slowly) $ \robot ros -> do
+      let others = try (carrying ros "cup")
+          stopping = sleep 1 >> inSeconds 0.5 (stopAll ros carry) >> atomically (runningGoals robot)
+      both
+        (others >>= (`shouldBe` Left (CancelledByOther "/carry")))
+        (stopping >>= (`shouldBe` []))
+    it "is a fault if the robot does not say that in time" . mission (const deaf) $ \robot ros -> do
+      let runs = atomically (runningGoals robot >>= check . (== [1]))
+          moving = firstOf [void (carrying ros "cup"), runs >> sleep 1]
+      void (tried moving)
+      tried (inSeconds 2 (stopAll ros carry)) >>= (`shouldBe` Left (NotConfirmed "/carry"))
+    it "of a server that is not there fails" . mission (const slowly) $ \_ ros ->
+      try (stopAll ros (untyped "/fly" ""))
+        >>= (`shouldBe` Left (ServiceFailed "/fly/_action/cancel_goal" "there is no such service"))
+    it "when none runs returns" . mission (const slowly) $ \_ ros -> inSeconds 0 (stopAll ros carry)
+
+  describe "A namespace" $
+    it "is that of relative names, and nests" . withRobot $ \robot ros -> do
+      let one say = say (Std (Just (1 :: Double)))
+          arm = inNamespace "arm" (inNamespace "/robot1/" ros)
+      publishing arm (publication "speed") one
+      publishing arm (publication "/speed") one
+      publishing ros (publication "speed") one
+      sleep 1
+      names <- published robot
+      [name | (_, Advertised name) <- names] `shouldBe` ["/robot1/arm/speed", "/speed", "/speed"]
+ where
+  lights = untypedService "/lights" "std_srvs/srv/SetBool"
+  speeds = publication "/speed" :: Publication (Std (Maybe Double))
+  deaf = slowly {confirmsAfter = 1 / 0}
+  withService script act = underSchedules 40 . onRobot $ \robot ros ->
+    offerService robot "/lights" script >> act robot ros
+  withRobot = underSchedules 40 . onRobot
+  onRobot act = withFakeRobot [] $ \robot ->
+    withRosWith defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
+  later wanted = case wanted of
+    Number n -> ServiceScript (realToFrac n) (Right wanted)
+    _ -> ServiceScript 0 (Right Null)
+  says answer _ = ServiceScript 0 answer
+  double n = object ["type" .= (3 :: Int), "double_value" .= (n :: Double)]
+  said n = Published "/speed" (object ["data" .= (n :: Double)])
+  published robot = filter (concerns . snd) <$> atomically (seen robot)
+  concerns what = case what of
+    Advertised _ -> True
+    Unadvertised _ -> True
+    Published _ _ -> True
+    _ -> False
+  errorOf act = either (\(ErrorCall text) -> text) (const "it returned") <$> try act
+  tried :: Behavior a -> Behavior (Either RosFault a)
+  tried = try
