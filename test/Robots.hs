@@ -8,22 +8,33 @@
 module Main (main) where
 
 import Control.Exception (displayException)
-import Control.Monad (unless, when)
+import Control.Monad (forever, unless, when)
 import Data.Aeson ((.=))
 import Data.Foldable (for_)
+import Data.IORef
 import System.Environment (getArgs)
 import System.Exit (die)
 
 import Behavior
+import Behavior.Parallel (firstOf)
 import Behavior.Time (timeout)
 import Robots.Cancelling
+import Robots.Clients
+import Robots.Losing
 import Robots.Stage
+import Robots.Topics
 
 rows :: [(Row, Stage -> Behavior ())]
 rows =
   [ (2, atRandomInstants)
   , (3, atOnce)
   , (4, neverConfirmed)
+  , (5, killed)
+  , (6, halfOpen)
+  , (7, restarted)
+  , (8, silences)
+  , (12, twoClients)
+  , (13, twoRobots)
   ]
 
 main :: IO ()
@@ -33,10 +44,20 @@ main = do
   stage <- newStage
   runBehavior . for_ rows $ \(n, row) -> when (n `elem` arguments) (runRow stage n (row stage))
 
--- | Writes how the row ended. (A fault of one does not end the others.)
+-- | Writes how the row ended, and by how much a thread that slept beside it was late at most: so late may all that is
+-- measured there be. (A fault of one row does not end the others.)
 runRow :: Stage -> Row -> Behavior () -> Behavior ()
 runRow stage n row = do
+  latest <- newIORef 0
   begun <- clock
-  how <- tryAny (timeout 600 row)
+  how <- tryAny (firstOf [timeout 600 row, lateness latest])
   ended <- clock
-  note stage n ["row ended" .= either displayException (const "well") how, "seconds" .= (ended - begun)]
+  late <- readIORef latest
+  note stage n
+    ["row ended" .= either displayException (const "well") how, "seconds" .= (ended - begun), "late" .= late]
+ where
+  lateness latest = forever $ do
+    before <- clock
+    sleep 0.02
+    after <- clock
+    modifyIORef' latest (max (after - before - 0.02))

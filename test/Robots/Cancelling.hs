@@ -9,6 +9,7 @@ module Robots.Cancelling
   ) where
 
 import Control.Monad (replicateM_, unless, void)
+import Data.Foldable (traverse_)
 import Data.Aeson ((.=))
 
 import Behavior
@@ -40,8 +41,7 @@ atOnce stage = withBridge stage 9090 $ \_ bridge -> withRos bridge $ \ros -> do
         begun <- clock
         stopped <- interrupted stage 3 [("server", name)] (isSent >> sleep instant) (plainly ros (fibonacci name))
         some (if any (<= begun + 0.001) stopped then n - 1 else n) name
-  some (100 :: Int) "/fast"
-  some 100 "/slow"
+  traverse_ (some (100 :: Int)) ["/fast", "/slow"]
 
 -- | A server that never confirms: it works on each goal to its end.
 neverConfirmed :: Stage -> Behavior ()

@@ -8,6 +8,7 @@ module Robots.Goals
   , plainly
   , untilFeedback
   , believing
+  , uninterrupted
   , interrupted
   , awaitServers
   ) where
@@ -45,11 +46,10 @@ untilFeedback :: Ros -> Action Value -> Behavior () -> Sending
 untilFeedback ros which act order =
   goalWith ros which (object ["order" .= order]) $ \feedback -> Signal.waitUntil (True <$ feedback) >> act
 
--- | Sends a goal with an order of its own, and writes when that was, when its stop was requested, when and how it
--- ended, and what it gave. What it throws is thrown.
-believing :: Stage -> Row -> [(Text, String)] -> IORef (Maybe Double) -> Sending -> Behavior ()
-believing stage row more stopAt send = do
-  order <- newOrder stage
+-- | Sends a goal with that order, and writes when that was, when its stop was requested, when and how it ended, and
+-- what it gave. What it throws is thrown.
+believing :: Stage -> Row -> [(Text, String)] -> Int -> IORef (Maybe Double) -> Sending -> Behavior ()
+believing stage row more order stopAt send = do
   begun <- clock
   how <- try (send order)
   ended <- clock
@@ -71,13 +71,21 @@ outcome how = case how of
     | isJust (fromException why :: Maybe SomeAsyncException) -> "stopped"
     | otherwise -> "other"
 
+-- | Sends a goal whose stop is never requested. What it throws is thrown.
+uninterrupted :: Stage -> Row -> [(Text, String)] -> Sending -> Behavior ()
+uninterrupted stage row more send = do
+  order <- newOrder stage
+  stopAt <- newIORef Nothing
+  believing stage row more order stopAt send
+
 -- | Sends a goal whose stop is requested when the behaviour has ended: gives when that was. (Whatever the goal throws
 -- is only written.)
 interrupted :: Stage -> Row -> [(Text, String)] -> Behavior () -> Sending -> Behavior (Maybe Double)
-interrupted stage row more until send = do
+interrupted stage row more instant send = do
+  order <- newOrder stage
   stopAt <- newIORef Nothing
   void . tryAny $
-    firstOf [believing stage row more stopAt send, until >> clock >>= writeIORef stopAt . Just]
+    firstOf [believing stage row more order stopAt send, instant >> clock >>= writeIORef stopAt . Just]
   readIORef stopAt
 
 -- | Waits until goals reach these servers over the bridge: one that has just started loses them. (They are sent over a

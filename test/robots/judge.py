@@ -11,11 +11,11 @@ import sys
 
 FOLDER, ROWS = sys.argv[1], [int(row) for row in sys.argv[2:]]
 
-# What the servers have recorded of each goal: (time, event), in the order of time.
+# What the servers have recorded of each goal, and each topic: (time, event), in the order of time.
 record = collections.defaultdict(list)
 for line in sorted(open(FOLDER + "/record"), key=lambda line: float(line.split()[0])):
-    when, server, order, event = line.split()
-    record[int(order)].append((float(when), event))
+    when, name, order, event = line.split()
+    record[int(order) or name].append((float(when), event))
 
 # What the program believes, by row.
 believed = collections.defaultdict(list)
@@ -84,11 +84,13 @@ def lies(goal):
 
 
 def in_general(row):
-    for entry in believed[row]:
-        if entry.get("lost by the bridge"):
-            lost = f"goals that the bridge lost when it had just started: {entry['lost by the bridge']}"
-            print(f"row {row}: {entry['server']}: {lost}")
+    lost = [e["lost by the bridge"] for e in believed[row] if "lost by the bridge" in e]
+    if lost:
+        counts = ", ".join(f"{n} goals by {m}" for n, m in sorted(collections.Counter(lost).items()))
+        print(f"row {row}: new bridges lost, before a goal reached its server: {counts}")
     ends = [e for e in believed[row] if "row ended" in e]
+    if ends:
+        print(f"row {row}: it took {ends[-1]['seconds']:.0f} s; a sleeping thread was late by {ends[-1]['late']:.3f} s")
     how = ends[-1]["row ended"] if ends else "it has not"
     claim(row, "the row ended", how, "well", how == "well")
     none_of(row, "goals that ended otherwise than the program believes", filter(lies, goals(row)))
@@ -138,6 +140,94 @@ def row_4():
     all_of(4, "refused: StillMoving, and never sent", refused, some)
     threads = [e for e in believed[4] if "threads after" in e]
     all_of(4, "no thread left", (e for e in threads if e["threads after"] == e["threads before"]), threads)
+
+
+def struck(row, kind, least, limit):
+    """What came of goals whose bridge was struck."""
+    entries = [e for e in believed[row] if "struck" in e and e["kind"] == kind]
+    lost = [e for e in entries if e["thrown"].startswith("the link to") and e["struck"]]
+    all_of(row, f"{kind}: LinkLost", lost, entries, least)
+    took = max((e["ended"] - e["struck"] for e in lost), default=99)
+    at_most(row, f"{kind}: from that until it was thrown", took, limit)
+    all_of(row, f"{kind}: cleanups that ran once", [e for e in entries if e["cleanups"] == 1], entries)
+    # Those that the servers went on with have to be counted as moving.
+    runs_on = [e for e in entries if (first({"order": e["of"]}, *ENDS) or 1e9) > e["ended"] and record[e["of"]]]
+    all_of(row, f"{kind}: goals that ran on, and were counted", (e for e in runs_on if e["moving"] > 0), runs_on, 0)
+
+
+def row_5():
+    struck(5, "in mid-goal", 30, 0.2)
+    struck(5, "during a cancel", 10, 0.2)
+
+
+def row_6():
+    struck(6, "in mid-goal", 5, 0.5 + 0.5 + 0.1)
+
+
+def row_7():
+    for kind in ("killed", "ended"):
+        struck(7, kind, 3, 0.2)
+    back = [e["subscribed again after"] for e in believed[7] if "subscribed again after" in e]
+    at_most(7, "from the start of the bridge to the next message", max(back, default=99), 2)
+    others = goals(7, kind="other client")
+    all_of(7, "goals of another client that went on", (g for g in others if g["outcome"] == "completed"), others, 6)
+    again = goals(7, kind="again")
+    for old in goals(7, kind="killed") + goals(7, kind="ended"):
+        old["over"] = first(old, *ENDS)
+        later = [g for g in again if g["begun"] > old["ended"]]
+        old["tries"] = [g for g in later if g["begun"] < old["over"]]
+        old["next"] = next((first(g, "accepted") for g in later if has(g, "accepted")), None)
+    olds = goals(7, kind="killed") + goals(7, kind="ended")
+    tries = [g for old in olds for g in old["tries"]]
+    refused = [g for g in tries if g["outcome"] == "StillMoving" and not record[g["order"]]]
+    all_of(7, "refused while the old goal ran", refused, tries, 3)
+    then = [old["next"] - old["over"] for old in olds if old["next"]]
+    all_of(7, "a new goal was accepted, after the end of the old one", (t for t in then if t > 0), olds, 6)
+    print(f"row 7: how long after that: at most {max(then, default=99):.2f} s")
+
+
+def row_8():
+    silence, more = 0.5, 0.1
+    faults = [e for e in believed[8] if "fault" in e]
+    silent = [e for e in faults if e["fault"].startswith("no message on")]
+    all_of(8, "no message: a fault", silent, faults, 15)
+    none_of(8, "goals of a branch that should not have been chosen", (
+        g for g in goals(8) if g["branch"] == "right" or not any(published_before(e, g["begun"]) for e in faults)))
+    never = [e for e in silent if e["what"] == "without messages"]
+    took = max(e["ended"] - e["begun"] for e in never)
+    at_most(8, "without messages: from watching to the fault", took, silence + more)
+    last = [e["ended"] - max(when for when, _ in record[e["topic"]] if when < e["ended"])
+            for e in silent if e["what"] == "falling silent"]
+    at_most(8, "falling silent: from the last message to the fault", max(last), silence + more)
+    claim(8, "not before the expected silence", f"{min(last) * 1000:.1f} ms", "at least 500 ms", min(last) >= silence)
+    readers = [e for e in believed[8] if "reader" in e]
+    all_of(8, "latched: readers that had the value", (e for e in readers if e["read"] == 7), readers, 10)
+    second = [e["ended"] - e["begun"] for e in readers if e["reader"] == "second"]
+    arrived = [e["arrived"] - when for e in believed[8] if "arrived" in e
+               for when, event in record["/bursts"] if event == str(e["number"])]
+    print(f"row 8: from publishing until the program had a message: at most {max(arrived) * 1000:.1f} ms")
+    print(f"row 8: latched: the second reader had it after at most {max(second) * 1000:.1f} ms")
+
+
+def published_before(entry, when):
+    return entry["what"] == "falling silent" and entry["begun"] <= when <= entry["ended"]
+
+
+def row_12():
+    theirs, ours = goals(12, client="theirs"), goals(12, client="ours")
+    completed = [g for g in theirs if g["outcome"] == "completed" and not has(g, "cancel")]
+    all_of(12, "the other client's: completed with their own result, never cancelled", completed, theirs, 500)
+    good = [g for g in ours if g["outcome"] in ("completed", "stopped") and not lies(g)]
+    all_of(12, "ours: completed with their own result, or stopped", good, ours, 500)
+    print(f"row 12: of ours {sum(has(g, 'canceled') for g in ours)} were cancelled")
+
+
+def row_13():
+    struck(13, "dying", 5, 0.2)
+    other = goals(13, kind="other robot")
+    all_of(13, "the other robot's goals completed", (g for g in other if g["outcome"] == "completed"), other, 30)
+    took = [g["ended"] - g["begun"] for g in other]
+    print(f"row 13: the other robot's goals took {statistics.median(took):.3f} s, at most {max(took):.3f} s")
 
 
 for row in ROWS:
