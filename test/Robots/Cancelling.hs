@@ -9,8 +9,8 @@ module Robots.Cancelling
   ) where
 
 import Control.Monad (replicateM_, unless, void)
-import Data.Foldable (traverse_)
 import Data.Aeson ((.=))
+import Data.Foldable (traverse_)
 
 import Behavior
 import Behavior.Internal.Seam.Runtime (liveThreadCount)
