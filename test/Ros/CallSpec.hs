@@ -113,7 +113,7 @@ spec = guarded $ do
       let runs = atomically (runningGoals robot >>= check . (== [1]))
           moving = firstOf [void (carrying ros "cup"), runs >> sleep 1]
       void (tried moving)
-      tried (inSeconds 2 (stopAll ros carry)) >>= (`shouldBe` Left (NotConfirmed "/carry"))
+      tried (inSeconds 2 (stopAll ros carry)) >>= (`shouldBe` Left unconfirmed)
     it "of a server that is not there fails" . mission (const slowly) $ \_ ros ->
       try (stopAll ros (untyped "/fly" ""))
         >>= (`shouldBe` Left (ServiceFailed "/fly/_action/cancel_goal" "there is no such service"))
@@ -132,6 +132,7 @@ spec = guarded $ do
  where
   lights = untypedService "/lights" "std_srvs/srv/SetBool"
   speeds = publication "/speed" :: Publication (Std (Maybe Double))
+  unconfirmed = NotConfirmed "/carry" "its server has not said that they have ended"
   deaf = slowly {confirmsAfter = 1 / 0}
   withService script act = underSchedules 40 . onRobot $ \robot ros ->
     offerService robot "/lights" script >> act robot ros

@@ -92,7 +92,14 @@ spec = guarded $ do
 
   describe "A goal whose stop is not confirmed" $ do
     it "is a fault when the patience has ended" . underSchedules 150 . mission (const stubborn) $ \_ ros ->
-      inSeconds 12 (tried (stopAfter 10 (carrying ros "cup"))) >>= (`shouldBe` Left (NotConfirmed "/carry"))
+      inSeconds 12 (tried (stopAfter 10 (carrying ros "cup"))) >>= (`shouldBe` Left (NotConfirmed "/carry" cancelling))
+    it "is one that names a bridge that works on requests only when no goal runs" . underSchedules 40 $
+      mission (const slowly) $ \robot ros -> do
+        workSerially robot
+        end <- inSeconds 12 (tried (stopAfter 10 (carrying ros "cup")))
+        case end of
+          Left (NotConfirmed "/carry" why) -> why `shouldContain` "909"
+          _ -> expectationFailure (show end)
     it "makes new ones be refused, until it has ended" . underSchedules 40 . mission (const stubborn) $ \robot ros -> do
       _ <- tried (stopAfter 10 (carrying ros "cup"))
       Signal.read (movingGoals ros) >>= (`shouldBe` 1)
@@ -170,6 +177,10 @@ instance RosAction Counting where
 -- | Takes a minute, and does not stop.
 stubborn :: GoalScript
 stubborn = slowly {confirmsAfter = 1 / 0}
+
+-- | What is known of its server then.
+cancelling :: String
+cancelling = "its server says that a goal is being cancelled"
 
 linkLost :: RosFault
 linkLost = LinkLost "the fake robot" "user error (connection lost)"

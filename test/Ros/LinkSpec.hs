@@ -19,7 +19,9 @@ import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Frame
 import Behavior.STM
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (events, simulate)
 import Behavior.Time
+import Behavior.Trace (Cause (..), End (..), Event (..), Span (..))
 import Ros.Stage
 import Support (ending, guarded)
 import qualified Support
@@ -78,6 +80,14 @@ spec = guarded $ do
       ros <- withRos (fakeRos robot) pure
       end <- try (carrying ros "cup")
       either (\e -> e `shouldBe` LinkLost "the fake robot" "its withRos has ended") (const (expectationFailure "!")) end
+    it "is a span in a trace, which says why it was lost" $ do
+      run <- simulate . mission (const slowly) $ \robot ros -> do
+        Signal.waitUntil (linkUp ros)
+        sleep 1 >> loseLink robot >> sleep 1 >> restoreLink robot
+        Signal.waitUntil (linkUp ros)
+        sleep 1
+      [(spanBegan s, time, how) | Ended s time how <- events run, spanName s == "link: the fake robot"]
+        `shouldBe` [(0, 1, FaultedWith "user error (connection lost)"), (2.5, 3.5, StoppedBy (SiblingFinished "2"))]
     it "of another robot is not concerned" . underSchedules 40 . withFakeRobot [] $ \one ->
       mission (const slowly) $ \_ ros ->
         (sleep 5 >> loseLink one) `both` withRos (fakeRos one) (\_ -> inSeconds 60 (void (carrying ros "cup")))

@@ -33,6 +33,7 @@ module Behavior.Ros.Fake
   , loseLink
   , restoreLink
   , freezeLink
+  , workSerially
 
     -- * What it has seen
   , Seen (..)

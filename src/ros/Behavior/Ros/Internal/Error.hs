@@ -59,9 +59,9 @@ data RosFault
     Undecodable String String
   | -- | A number is null or NaN: see 'Behavior.Ros.measured'.
     NotMeasured
-  | -- | The action's server has not confirmed within 'Behavior.Ros.patience' that a goal has stopped. The robot may
-    -- still move.
-    NotConfirmed String
+  | -- | This action's server has not confirmed within 'Behavior.Ros.patience' that a goal has stopped, and what is
+    -- known about that. The robot may still move.
+    NotConfirmed String String
   deriving (Eq, Show)
 
 instance Exception RosFault where
@@ -70,4 +70,5 @@ instance Exception RosFault where
     Silent topic seconds -> "no message on " ++ topic ++ " within " ++ show seconds ++ " s"
     Undecodable source why -> "what came from " ++ source ++ " is not what was expected: " ++ why
     NotMeasured -> "a number that is null or NaN"
-    NotConfirmed action -> action ++ " has not confirmed that the goal has stopped: the robot may still move"
+    NotConfirmed action why ->
+      action ++ " has not confirmed that the goal has stopped (" ++ why ++ "): the robot may still move"

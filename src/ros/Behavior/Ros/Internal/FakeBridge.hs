@@ -59,9 +59,15 @@ fakeRos robot =
   connection received it =
     Connection
       { receiveFrame = atomically (unlessBroken it (unlessFrozen (readTQueue (toClient it))))
-      , sendFrame = \frame -> now >>= \time -> atomically (unlessBroken it (unlessFrozen' (obey robot it time frame)))
+      , sendFrame = \frame -> now >>= \time -> atomically (unlessBroken it (unlessFrozen' (takeFrame it time frame)))
       , sendPing = atomically (unlessBroken it (readTVar (isFrozen robot))) >>= \frozen -> unless frozen received
       }
+  takeFrame it time frame = do
+    later <- (&&) <$> readTVar (isSerial robot) <*> (not . Map.null <$> readTVar (goals robot))
+    if later then writeTQueue (newCalls robot) (postponed it frame) else obey robot it time frame
+  postponed it frame = do
+    atomically (readTVar (goals robot) >>= check . Map.null)
+    now >>= \time -> atomically (obey robot it time frame)
   unlessBroken it act =
     readTVar (isBroken it) >>= \broken ->
       if broken then throwSTM (userError "connection lost") else act
@@ -110,7 +116,7 @@ obey robot it time frame = case decodeRequest (Limits 1048576 64) frame of
   cancel at g = do
     accepted <- readTVar (isAccepted g)
     note robot at (CancelCame (number g) accepted)
-    when accepted (writeTVar (cancelWanted g) True)
+    when accepted (writeTVar (cancelWanted g) True >> publishStatus robot (action g))
     pure accepted
 
 -- | Answers a call.

@@ -18,6 +18,7 @@ module Behavior.Ros.Internal.FakeRobot
   , loseLink
   , restoreLink
   , freezeLink
+  , workSerially
 
     -- * What it has seen
   , seen
@@ -56,6 +57,7 @@ withFakeRobot actions behavior = do
       <*> newTQueueIO
       <*> newTVarIO []
       <*> newTVarIO True
+      <*> newTVarIO False
       <*> newTVarIO False
       <*> newTVarIO Map.empty
       <*> newTVarIO []
@@ -136,6 +138,13 @@ restoreLink robot = atomically (writeTVar (isReachable robot) True >> writeTVar 
 -- @since 0.1.0.0
 freezeLink :: FakeRobot -> Behavior ()
 freezeLink robot = atomically (writeTVar (isFrozen robot) True)
+
+-- | From now on the bridge works on a request only when no goal runs, as rosbridge_suite does with its fault 909: a
+-- cancel comes when there is nothing to cancel any more.
+--
+-- @since 0.1.0.0
+workSerially :: FakeRobot -> Behavior ()
+workSerially robot = atomically (writeTVar (isSerial robot) True)
 
 -- | What the robot has seen and done, in order, with the times.
 --

@@ -36,7 +36,7 @@ import Behavior (Behavior, Seconds)
 import Behavior.Ros.Internal.FakeScript
 import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Message
-import Behavior.Ros.Internal.StopAll (Statuses (..))
+import Behavior.Ros.Internal.Status (Statuses (..), statusOf)
 
 -- | A robot with a bridge that exists only in the program, for simulations ("Behavior.Sim") and tests.
 --
@@ -51,6 +51,8 @@ data FakeRobot = FakeRobot
   , clients :: TVar [Client]
   , isReachable :: TVar Bool
   , isFrozen :: TVar Bool
+  , isSerial :: TVar Bool
+  -- ^ Whether the bridge works on requests only while no goal runs.
   , lastPublished :: TVar (Map Text Value)
   , record :: TVar [(Seconds, Seen)]
   }
@@ -88,11 +90,12 @@ note robot time what = modifyTVar' (record robot) ((time, what) :)
 -- | Publishes the status of each goal of the action, as servers do whenever that changes.
 publishStatus :: FakeRobot -> Text -> STM ()
 publishStatus robot name = do
-  running <- map number . filter ((== name) . action) . Map.elems <$> readTVar (goals robot)
+  running <- filter ((== name) . action) . Map.elems <$> readTVar (goals robot)
+  moving <- traverse (\g -> (\stops -> (number g, if stops then 3 else 2)) <$> readTVar (cancelWanted g)) running
   known <- map snd <$> readTVar (record robot)
   let ended = [(n, status) | GoalEnded n status <- known, GoalCame n (Text.unpack name) `elem` known]
-  publishNow robot (name <> "/_action/status") . toRos . Statuses $
-    [(goalId n, status) | (n, status) <- [(n, 2) | n <- running] ++ ended]
+  publishNow robot (statusOf name) . toRos . Statuses $
+    [(goalId n, status) | (n, status) <- moving ++ ended]
 
 -- | Publishes a message, and keeps it for those who subscribe later.
 publishNow :: FakeRobot -> Text -> Value -> STM ()

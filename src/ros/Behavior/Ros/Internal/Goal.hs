@@ -25,7 +25,7 @@ module Behavior.Ros.Internal.Goal
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, mask, throwIO, try)
-import Control.Monad (unless, when)
+import Control.Monad (unless, void, when)
 import Data.Aeson (Value)
 import qualified Data.Map.Strict as Map
 import Data.Proxy (Proxy (..))
@@ -39,9 +39,10 @@ import Behavior.Ros.Internal.Frame (Request (..))
 import Behavior.Ros.Internal.Link hiding (feedback)
 import Behavior.Ros.Internal.Message
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Status
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal, watching)
-import Behavior.Time (cleanupWithin, sleepForever, timeout)
+import Behavior.Time (cleanupWithin, now, sleepForever, timeout)
 import Behavior.Trace (named)
 
 -- $setup
@@ -185,9 +186,10 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore ->
   (n, running) <- handOver ros restore (start ros which (toRos wanted) latest)
   try (restore (atomically (awaitEnd running))) >>= \case
     Right how -> atomically (conclude how)
-    Left stop -> confirmation ros which n running >>= maybe (throwIO (NotConfirmed name)) (afterStop stop)
+    Left stop -> confirmation ros which n running >>= maybe unconfirmed (afterStop stop)
  where
   name = Text.unpack (nameOf which)
+  unconfirmed = whyNotConfirmed ros which >>= throwIO . NotConfirmed name
   conclude how = case how of
     Ended 4 values -> expected which values
     Ended 5 _ -> throwSTM (CancelledByOther name)
@@ -200,6 +202,21 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore ->
     Ended 4 _ -> atomically (conclude how)
     Lost -> atomically (conclude how)
     _ -> throwIO (stop :: SomeException)
+
+-- | What is known of a server that does not confirm.
+whyNotConfirmed :: Ros -> Action a -> Behavior String
+whyNotConfirmed ros which = atomically $ do
+  known <- Map.lookup (statusOf (nameOf which)) <$> readTVar (kept ros)
+  said <- maybe (pure Nothing) (readTVar . newest) known
+  pure $ case decoded . arrived <$> said of
+    Just (Right (Statuses goals))
+      | 3 `elem` map snd goals -> "its server says that a goal is being cancelled"
+      | all (hasEnded . snd) goals -> "its server says that none of its goals runs"
+      | otherwise -> "its server says that a goal runs, and is not being cancelled"
+    Just (Left why) -> why
+    Nothing ->
+      "nothing is known of its server: the bridge has not answered since. Bridges with the fault 909 of rosbridge_suite"
+        ++ " work on a cancel only when the goal has ended"
 
 -- | Registers the goal, and hands it to the writer.
 start :: Ros -> Action a -> Value -> TVar (Maybe Value) -> STM (Text, Sent)
@@ -216,18 +233,24 @@ start ros which wanted latest = do
 
 -- | Cancels the goal, again and again, until it has ended or the patience has.
 confirmation :: Ros -> Action a -> Text -> Sent -> Behavior (Maybe End)
-confirmation ros which n running =
-  cleanupWithin (patience (rosOptions ros)) (askEvery ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
+confirmation ros which n running = do
+  begun <- now
+  cleanupWithin limit (askEvery begun ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
  where
-  askEvery pauses = do
-    ended <- atomically ((Just <$> awaitEnd running) `orElse` (Nothing <$ askToCancel))
+  limit = patience (rosOptions ros)
+  askEvery begun pauses = do
+    time <- now
+    let isLate = time - begun >= limit / 2
+        asking = askToCancel >> when isLate (askForStatus time)
+    ended <- atomically ((Just <$> awaitEnd running) `orElse` (Nothing <$ asking))
     case (ended, pauses) of
-      (Nothing, pause : later) -> timeout pause (atomically (awaitEnd running)) ? askEvery later
+      (Nothing, pause : later) -> timeout pause (atomically (awaitEnd running)) ? askEvery begun later
       _ -> maybe (atomically (awaitEnd running)) pure ended
   askToCancel = do
     ask ros (CancelGoal n (nameOf which))
     before <- readTVar (cancelled running)
     unless before (writeTVar (cancelled running) True)
+  askForStatus = void . keptOf ros (statusOf (nameOf which)) (messageType (Proxy :: Proxy Statuses))
 
 awaitEnd :: Sent -> STM End
 awaitEnd running = readTVar (end running) >>= maybe retry pure

@@ -10,13 +10,13 @@ module Behavior.Ros.Internal.Keeper
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (ErrorCall (..), finally, throwIO)
+import Control.Exception (ErrorCall (..), Exception, finally, throwIO)
 import Control.Monad (forever)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (for_, traverse_)
 import Prelude hiding (take)
 
-import Behavior (Behavior, Seconds, failWith, sleep, tryAny, (?))
+import Behavior (Behavior, Seconds, sleep, tryAny, (?))
 import Behavior.Internal.Core.Seconds (duration)
 import Behavior.Parallel (firstOf)
 import Behavior.Ros.Internal.Frame
@@ -27,6 +27,7 @@ import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
 import Behavior.STM (atomically)
 import Behavior.Time (now, sleepForever, timeout)
+import Behavior.Trace (named)
 
 -- $setup
 -- >>> import Behavior.Ros
@@ -98,12 +99,23 @@ connected ros transport = do
   let use connection = do
         time <- now
         first <- atomically (writeTVar up True >> comeUp ros time)
-        firstOf [whyItEnds (reading ros connection), whyItEnds (writing ros connection first), whyItEnds (pinging ros)]
+        -- (A trace shows when the link was there, and why no longer.)
+        named ("link: " ++ robot ros) $
+          firstOf (map whyItEnds [reading ros connection, writing ros connection first, pinging ros])
+            >>= throwIO . LinkEnds
       connecting' = connecting transport (frameBytes (rosOptions ros)) (atomically (receivedAny ros)) use
       tooLong = do
-        timeout connectWithin (atomically (readTVar up >>= check)) ? failWith "it takes too long to connect"
+        timeout connectWithin (atomically (readTVar up >>= check)) ? throwIO (LinkEnds "it takes too long to connect")
         sleepForever
   firstOf [either show id <$> tryAny connecting', whyItEnds tooLong]
+
+-- | Why a link has ended.
+newtype LinkEnds = LinkEnds String
+
+instance Show LinkEnds where
+  show (LinkEnds why) = why
+
+instance Exception LinkEnds
 
 -- | The exception that ends it.
 whyItEnds :: Behavior () -> Behavior String
@@ -144,6 +156,6 @@ pinging ros = forever $ do
   sleep (pingEvery options)
   before <- atomically (writeTVar (pingWanted ros) True >> readTVar (received ros))
   timeout (pongWithin options) (atomically (readTVar (received ros) >>= check . (/= before)))
-    ? failWith ("nothing was received within " ++ show (pongWithin options) ++ " s after a ping")
+    ? throwIO (LinkEnds ("nothing was received within " ++ show (pongWithin options) ++ " s after a ping"))
  where
   options = rosOptions ros

@@ -50,13 +50,16 @@ import Data.List (nub)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isNothing)
+import Data.Proxy (Proxy (..))
 import Data.Text (Text)
 import qualified Data.Text as Text
 
 import Behavior (Behavior, Seconds, (?))
 import Behavior.Ros.Internal.Error
 import Behavior.Ros.Internal.Frame
+import Behavior.Ros.Internal.Message (messageType)
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Status (Statuses, statusOf)
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal, named, watching)
 import Behavior.Time (timeout)
@@ -217,7 +220,9 @@ comeUp ros time = do
   pure $
     [Advertise name type' keeps | (name, Advertised type' keeps _) <- Map.toList topicsOfOurs]
       ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
-      ++ [Subscribe (statusOf action) "action_msgs/msg/GoalStatusArray" | action <- moving]
+      ++ [Subscribe (statusOf action) (messageType statuses) | action <- moving]
+ where
+  statuses = Proxy :: Proxy Statuses
 
 -- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is
 -- never sent.
@@ -300,6 +305,3 @@ mayRun ros action = any ((== action) . sentTo) <$> readTVar (sent ros)
 -- | Ends the goal, unless it has ended.
 endWith :: Sent -> End -> STM ()
 endWith known how = readTVar (end known) >>= \before -> when (isNothing before) (writeTVar (end known) (Just how))
-
-statusOf :: Text -> Text
-statusOf action = action <> "/_action/status"

@@ -12,9 +12,8 @@ module Behavior.Ros.Internal.Receive
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Monad (unless)
-import Data.Aeson (Object, Value (String), withObject, (.:))
-import Data.Aeson.Types (parseEither)
+import Control.Monad (unless, when)
+import Data.Aeson (Value (String))
 import Data.Foldable (for_, toList, traverse_)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust)
@@ -24,7 +23,9 @@ import Prelude hiding (take)
 import Behavior (Seconds)
 import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Link
+import Behavior.Ros.Internal.Message (decoded)
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Status
 
 -- | Takes what came from the bridge at this time, in a frame of this size.
 take :: Ros -> Seconds -> Int -> Answer -> STM ()
@@ -63,15 +64,11 @@ takeAnswer ros time answer = case answer of
   call n = Map.lookup n <$> readTVar (calls ros)
   forget n = modifyTVar' (sent ros) (Map.delete n)
   -- Goals that were sent in this connection may not have reached their server yet.
-  takeStatus action value = case parseEither anyRuns value of
+  takeStatus action value = case decoded value of
     Left why -> refuse ros why
-    Right True -> pure ()
-    Right False -> do
+    Right (Statuses goals) -> when (all (hasEnded . snd) goals) $ do
       current <- connections <$> readTVar (link ros)
       modifyTVar' (sent ros) (Map.filter (\known -> sentTo known /= action || sentIn known == current))
-  anyRuns = withObject "GoalStatusArray" $ \o -> do
-    goals <- o .: "status_list"
-    any (`notElem` [4, 5, 6 :: Int]) <$> traverse (.: "status") (goals :: [Object])
 
 -- | Counts a frame that was refused, and reports why.
 refuse :: Ros -> String -> STM ()

@@ -9,13 +9,11 @@
 module Behavior.Ros.Internal.StopAll
   ( stopAll
   , Cancelling (..)
-  , Statuses (..)
   ) where
 
 import Control.Exception (throwIO)
 import Control.Monad (unless, when)
 import Data.Aeson (Value, object, withObject, (.=))
-import Data.Aeson.Types (Parser)
 import qualified Data.Text as Text
 
 import Behavior (Behavior, (?))
@@ -25,6 +23,7 @@ import Behavior.Ros.Internal.Goal
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Status
 import Behavior.Ros.Internal.Topic
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)
@@ -68,12 +67,12 @@ stopAll ros which = named ("stop all goals: " ++ name) $ do
   when (how == rejected) $ throwIO (ServiceFailed name "it does not cancel them")
   unless (null goals) $
     timeout (patience (rosOptions ros)) (Signal.waitUntil (endOf goals <$> latest ros statuses))
-      ? throwIO (NotConfirmed name)
+      ? throwIO (NotConfirmed name "its server has not said that they have ended")
  where
   name = Text.unpack (nameIn ros which)
-  statuses = topic (name ++ "/_action/status") latched :: Topic Statuses
+  statuses = topic (Text.unpack (statusOf (nameIn ros which))) latched :: Topic Statuses
   rejected = 1
-  endOf goals (Statuses known) = and [maybe False (`elem` [4, 5, 6]) (lookup g known) | g <- goals]
+  endOf goals (Statuses known) = and [maybe False hasEnded (lookup g known) | g <- goals]
 
 -- | action_msgs/srv/CancelGoal. (An empty request is about all goals.)
 data CancelGoal
@@ -91,17 +90,3 @@ instance RosMessage Cancelling where
     Cancelling <$> entry o "return_code" <*> (entry o "goals_canceling" >>= traverse goalId)
   toRos (Cancelling how goals) =
     object ["return_code" .= how, "goals_canceling" .= [object ["goal_id" .= g] | g <- goals]]
-
--- | Goals, each with its status.
-newtype Statuses = Statuses [(Value, Int)]
-
-instance RosMessage Statuses where
-  messageType _ = "action_msgs/msg/GoalStatusArray"
-  fromRos = withObject "GoalStatusArray" $ \o -> Statuses <$> (entry o "status_list" >>= traverse status)
-   where
-    status = withObject "GoalStatus" $ \o -> (,) <$> (entry o "goal_info" >>= goalId) <*> entry o "status"
-  toRos (Statuses known) =
-    object ["status_list" .= [object ["goal_info" .= object ["goal_id" .= g], "status" .= how] | (g, how) <- known]]
-
-goalId :: Value -> Parser Value
-goalId = withObject "GoalInfo" (`entry` "goal_id")
