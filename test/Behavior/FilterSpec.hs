@@ -96,6 +96,18 @@ hysteresis = do
         awaitEnd caller `shouldReturn` Gave ()
       notes entries `shouldReturn` ["task", "recovery", "task"]
 
+  for_ [(False, [95, 0, 50]), (True, [0, 95, 50])] $ \(initial, levels) ->
+    it ("forgets a value that changed, and back, without an effect on its operator, from " ++ show initial) $ do
+      entries <- newLog
+      level <- newTVarIO (50 :: Int)
+      armed <- newTVarIO False
+      let signal = (&&) <$> watchedVar armed <*> ((/= initial) <$> Signal.hysteresis initial 10 90 (watchedVar level))
+          changes = for_ levels $ \l -> sleep 1 >> atomically (writeTVar level l)
+      _ <- simulate $
+        Signal.switch signal (\s -> note entries s >> hang)
+          ||| (changes >> sleep 1 >> atomically (writeTVar armed True) >> sleep 1)
+      notes entries `shouldReturn` [False]
+
   it "keeps its memory across recoveries" $ do
     entries <- newLog
     level <- newTVarIO (95 :: Int)
