@@ -83,9 +83,11 @@ spec = guarded $ do
         came <- atomically (seen robot)
         -- (At 0, 20, 60 and 140 ms; and at 300 and 500 ms until it is confirmed.)
         [accepted | (_, CancelCame 1 accepted) <- came] `shouldBe` [False, False, False, True, True, True]
-    it "that succeeds all the same has completed" . underSchedules 150 $
-      mission (const slowly {confirmsWith = Succeeds "a cup"}) $ \_ ros ->
-        inSeconds 10.5 (stopAfter 10 (carrying ros "cup")) >>= (`shouldBe` Just "a cup")
+    it "that succeeds all the same is interrupted, too: what comes after it does not run" . underSchedules 150 $
+      mission (const slowly {confirmsWith = Succeeds "a cup"}) $ \robot ros -> do
+        inSeconds 10.5 (stopAfter 10 (carrying ros "cup" >> carrying ros "pot")) >>= (`shouldBe` Nothing)
+        came <- atomically (seen robot)
+        length [() | (_, GoalCame _ _) <- came] `shouldBe` 1
     it "that is aborted meanwhile has stopped" . underSchedules 40 $
       mission (const slowly {confirmsWith = Aborts "fell"}) $ \_ ros ->
         inSeconds 10.5 (stopAfter 10 (carrying ros "cup")) >>= (`shouldBe` Nothing)

@@ -123,13 +123,14 @@ replacing which = which {preempts = True}
 -- this goal, and asks again, after 20, 40, 80, 160 and then every 200 ms, since servers drop a cancel that comes before
 -- they have accepted the goal.
 --
--- [Result] The goal's, also of one that has succeeded although it was being cancelled.
+-- [Result] The goal's.
 -- [Failure] 'Rejected', 'Aborted', 'CancelledByOther'; 'NoServer' if there is no link within
 --   'Behavior.Ros.noServerAfter'; 'StillMoving' if a goal of ours on this action may still run, unless it is
 --   'replacing'. (If the server is not there, it waits: 'Behavior.Time.timeout' limits that.)
 -- [Fault] 'LinkLost' at once when the link is lost; 'Undecodable' if the result is not what is expected;
 --   'NotConfirmed' if the server has not confirmed the stop within 'Behavior.Ros.patience'.
--- [Cancellation] Returns after the robot has confirmed, or with one of these faults.
+-- [Cancellation] Returns after the robot has confirmed, or with one of these faults. A goal that succeeds all the same
+--   counts as interrupted.
 --
 -- With 'NotConfirmed' and 'LinkLost' /the robot may still move/ when the operator goes on: so a
 -- 'Behavior.Signal.monitor' may start its recovery while it does. Such goals are counted ('Behavior.Ros.movingGoals')
@@ -197,9 +198,8 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore ->
     Ended _ values -> throwSTM (Rejected name (textOf values))
     Complained why -> throwSTM (Rejected name (Text.unpack why))
     Lost -> readTVar (link ros) >>= throwSTM . LinkLost (robot ros) . whyLost
-  -- What has succeeded has completed, although its stop was requested.
+  -- (Also if it has succeeded: if the stop ended here, what comes after the goal would run.)
   afterStop stop how = case how of
-    Ended 4 _ -> atomically (conclude how)
     Lost -> atomically (conclude how)
     _ -> throwIO (stop :: SomeException)
 
