@@ -48,6 +48,7 @@ import qualified Examples.GreenhouseRoverSpec
 import qualified Examples.PatrolSpec
 import qualified Examples.PickAndPlaceSpec
 import qualified Examples.ProgressProblemSpec
+import qualified Examples.RosMissionSpec
 import qualified Examples.TestingARobotSpec
 import qualified Examples.YourOwnMonadSpec
 import qualified OrdinaryWordsSpec
@@ -141,6 +142,7 @@ main = hspec $ do
     describe "door-battery" Examples.DoorBatterySpec.spec
     describe "greenhouse-rover" Examples.GreenhouseRoverSpec.spec
     describe "progress-problem" Examples.ProgressProblemSpec.spec
+    describe "ros-mission" Examples.RosMissionSpec.spec
     describe "Robots" $ do
       describe "patrol" Examples.PatrolSpec.spec
       describe "pick-and-place" Examples.PickAndPlaceSpec.spec

@@ -1,21 +1,31 @@
+{-# LANGUAGE RecordWildCards #-}
+
 -- |
--- The paper's mission once more, with names for what a picture shows. (The actions of the mock world
--- have names already.)
+-- The paper's mission once more, with names for what a picture shows. It is given the robot: so @door-battery@ runs it
+-- in the mock world, and @ros-mission@ on a robot that speaks ROS.
 module Named
-  ( bt
+  ( Robot (..)
+  , bt
   ) where
 
 import Behavior
+import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Trace (named)
-import Robot hiding (batteryLow)
 
-bt :: Behavior ()
-bt = Signal.monitor batteryLow recharge (named "enter room" enterRoom >> doTask)
+-- | What the robot can do and perceive. (What it does has names in a picture, if the robot gives it some.)
+data Robot door = Robot
+  { frontDoor, backDoor :: door
+  , open, passThrough, close, smash :: door -> Behavior ()
+  , recharge, doTask :: Behavior ()
+  , battery :: Signal Int
+  -- ^ Percent.
+  }
+
+bt :: Robot door -> Behavior ()
+bt Robot {..} = Signal.monitor batteryLow recharge (named "enter room" enterRoom >> doTask)
  where
-  batteryLow = Signal.named "battery low" ((< 10) <$> Signal.named "battery" (Signal.polling 0.01 batteryLevel))
-
-enterRoom :: Behavior ()
-enterRoom =
-  (open frontDoor >> passThrough frontDoor >> close frontDoor)
-    ? ((open backDoor ? smash backDoor) >> passThrough backDoor)
+  batteryLow = Signal.named "battery low" ((< 10) <$> Signal.named "battery" battery)
+  enterRoom =
+    (open frontDoor >> passThrough frontDoor >> close frontDoor)
+      ? ((open backDoor ? smash backDoor) >> passThrough backDoor)

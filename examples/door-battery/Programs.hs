@@ -7,6 +7,8 @@ module Programs
   ) where
 
 import Behavior (Behavior)
+import qualified Behavior.Signal as Signal
+import Named (Robot (..))
 import qualified Named
 import Options (Program (..))
 import qualified Paper.EachDoor as EachDoor
@@ -14,6 +16,8 @@ import qualified Paper.EachDoorThreeTimes as EachDoorThreeTimes
 import qualified Paper.FrontDoorFirst as FrontDoorFirst
 import qualified Paper.FrontDoorUnless as FrontDoorUnless
 import qualified Paper.Introduction as Introduction
+import qualified Robot as Mock
+import World (Door)
 
 behavior :: Program -> Behavior ()
 behavior = \case
@@ -22,4 +26,19 @@ behavior = \case
   OverDoors -> EachDoor.bt
   WithAttempts -> EachDoorThreeTimes.bt
   Introduction -> Introduction.bt
-  WithNames -> Named.bt
+  WithNames -> Named.bt mock
+
+-- | The robot of the mock world.
+mock :: Robot Door
+mock =
+  Robot
+    { frontDoor = Mock.frontDoor
+    , backDoor = Mock.backDoor
+    , open = Mock.open
+    , passThrough = Mock.passThrough
+    , close = Mock.close
+    , smash = Mock.smash
+    , recharge = Mock.recharge
+    , doTask = Mock.doTask
+    , battery = Signal.polling 0.01 Mock.batteryLevel
+    }
