@@ -8,7 +8,7 @@ module Robots.Cancelling
   , neverConfirmed
   ) where
 
-import Control.Monad (replicateM_, unless, void)
+import Control.Monad (replicateM_, unless, void, when)
 import Data.Aeson ((.=))
 import Data.Foldable (traverse_)
 
@@ -35,13 +35,14 @@ atRandomInstants stage = withBridge stage 9090 $ \_ bridge -> withRos bridge $ \
 atOnce :: Stage -> Behavior ()
 atOnce stage = withBridge stage 9090 $ \_ bridge -> withRos bridge $ \ros -> do
   awaitServers stage 3 bridge ["/fast", "/slow"]
-  let some n name = unless (n == 0) $ do
+  let some tries n name = unless (n == 0) $ do
+        when (tries == 0) $ failWith ("too few goals were cancelled at once on " ++ name)
         instant <- somewhere 0 0.0005
         let isSent = Signal.waitUntil ((> 0) <$> movingGoals ros)
         begun <- clock
         stopped <- interrupted stage 3 [("server", name)] (isSent >> sleep instant) (plainly ros (fibonacci name))
-        some (if any (<= begun + 0.001) stopped then n - 1 else n) name
-  traverse_ (some (100 :: Int)) ["/fast", "/slow"]
+        some (tries - 1) (if any (<= begun + 0.001) stopped then n - 1 else n) name
+  traverse_ (some (400 :: Int) (100 :: Int)) ["/fast", "/slow"]
 
 -- | A server that never confirms: it works on each goal to its end.
 neverConfirmed :: Stage -> Behavior ()

@@ -27,7 +27,7 @@ module Robots.Stage
   ) where
 
 import Control.Concurrent.MVar
-import Control.Exception (bracket)
+import Control.Exception (bracket, uninterruptibleMask_)
 import Control.Monad ((>=>))
 import Data.Aeson (encode, object, (.=))
 import Data.Aeson.Types (Pair)
@@ -69,10 +69,10 @@ newStage = do
 -- | A row of the table.
 type Row = Int
 
--- | Writes a line.
+-- | Writes a line: all of it, also in a thread whose stop is requested.
 note :: Stage -> Row -> [Pair] -> IO ()
 note stage row pairs =
-  withMVar (believed stage) $ \h -> Bytes.hPutStrLn h (encode (object (("row" .= row) : pairs)))
+  uninterruptibleMask_ . withMVar (believed stage) $ \h -> Bytes.hPutStrLn h (encode (object (("row" .= row) : pairs)))
 
 -- | CLOCK_MONOTONIC, which the servers read, too.
 clock :: IO Double
