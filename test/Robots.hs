@@ -50,7 +50,7 @@ runRow :: Stage -> Row -> Behavior () -> Behavior ()
 runRow stage n row = do
   latest <- newIORef 0
   begun <- clock
-  how <- tryAny (firstOf [timeout 600 row, lateness latest])
+  how <- tryAny (firstOf [timeout (if isLong stage then 1800 else 150) row, lateness latest])
   ended <- clock
   late <- readIORef latest
   note stage n
