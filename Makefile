@@ -1,5 +1,5 @@
 .PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak rules \
-  signals reality attacks robots mutants release ci clean
+  signals reality attacks robot robots mutants release ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -21,6 +21,7 @@ help:
 	@echo 'make signals   SIGINT, SIGTERM, SIGHUP at 1,000 random moments each (MOMENTS=100 for fewer)'
 	@echo 'make reality   the simulator against real threads (SEED=7 selects the programs)'
 	@echo 'make attacks   programs that try to break the promises (NAMES="Storm" selects)'
+	@echo 'make robot     the mission of make demo on a simulated robot that speaks ROS, over a bridge'
 	@echo 'make robots    goals, topics and lost links with real action servers over a real bridge (ROWS="2 3"'
 	@echo '               selects; LONG=1: more often)'
 	@echo 'make rules     the rules of the specification that no random program reaches'
@@ -65,6 +66,9 @@ reality:
 
 attacks:
 	@.ci/attacks $(NAMES)
+
+robot:
+	@.ci/robots mission
 
 robots:
 	@.ci/robots $(ROWS)

@@ -21,12 +21,14 @@ import Behavior.Time (timeout)
 import Robots.Cancelling
 import Robots.Clients
 import Robots.Losing
+import Robots.Missions
 import Robots.Stage
 import Robots.Topics
 
 rows :: [(Row, Stage -> Behavior ())]
 rows =
-  [ (2, atRandomInstants)
+  [ (1, missions)
+  , (2, atRandomInstants)
   , (3, atOnce)
   , (4, neverConfirmed)
   , (5, killed)

@@ -40,7 +40,7 @@ robotOver ros =
       -- goal's end may come before the message that says so: without the wait, the robot would recharge once more.)
       recharge = named "recharge" $ do
         does "recharge" 0 ? (at "open" front >> does "recharge" 0)
-        Signal.waitUntil ((> 90) <$> level)
+        Signal.waitUntil (Signal.named "charged" ((> 90) <$> level))
     , doTask = named "do task" (does "do task" 0)
     , battery = level
     }

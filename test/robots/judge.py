@@ -6,6 +6,7 @@ each claim; the exit code is 1 if any has failed.
 
 import collections
 import json
+import os
 import statistics
 import sys
 
@@ -111,6 +112,69 @@ def latencies(row, most, beyond, among):
         if most:
             at_most(row, f"{server}: 99th percentile", percentile(took, 0.99), most)
         at_most(row, f"{server}: median beyond the server's own time", statistics.median(rest), beyond)
+
+
+def ways():
+    """What the tree does if nothing interrupts it: (action with its door, how it ends)."""
+    well = lambda *names: [(name, "succeeded") for name in names]
+    front, back = well("open1", "pass_through1", "close1"), well("pass_through2", "do_task")
+    yield front + well("do_task")
+    for n in range(3):
+        failed = front[:n] + [(front[n][0], "aborted")]
+        yield failed + well("open2") + back
+        yield failed + [("open2", "aborted"), ("smash2", "succeeded")] + back
+
+
+def is_right(parts):
+    """Whether these are ways that were broken off, and then one to its end."""
+    begins = [way[:n] for way in ways() for n in range(len(way) + 1)]
+    return parts[-1] in ways() and all(
+        part in begins or (part[:-1] in begins and part[-1][1] == "canceled") for part in parts[:-1])
+
+
+def row_1():
+    events = [line.split() for line in open(FOLDER + "/missions")]
+    starts = [i for i, (_, what, _, _) in enumerate(events) if what == "mission"] + [len(events)]
+    believes = [e["how"] for e in believed[1] if "mission" in e]
+    right = interrupted = running = rejected = both = unheeded = total = 0
+    for begin, end in zip(starts, starts[1:]):
+        # (The robot prepares some missions that do not take place, before the program knows that it is reached.)
+        if not any(event == "accepted" for _, _, _, event in events[begin:end]):
+            continue
+        total += 1
+        ended, runs, lows, charges, parts = [], None, [], [], [[]]
+        for when, what, number, event in events[begin:end]:
+            if event == "accepted":
+                both += runs is not None
+                runs = number
+            elif event in ENDS and event != "rejected":
+                both += runs != number
+                runs = None
+                ended.append(float(when))
+                parts[-1].append((what, event))
+                if what == "recharge" and event == "succeeded":
+                    charges.append(float(when))
+                    parts.append([])
+            rejected += event == "rejected"
+            if what == "battery":
+                lows.append(float(when))
+        running += runs is not None
+        # What comes after the last goal of the tree belongs to the recharging.
+        cut = [part[:next((i for i, (what, _) in enumerate(part) if what == "recharge"), len(part))] for part in parts]
+        over = ended[-1] if ended else 0
+        heeded = [low for low in lows if low > over - 0.3 or any(charge > low - 0.1 for charge in charges)]
+        unheeded += len(lows) - len(heeded)
+        interrupted += len(charges) > 0
+        if is_right(cut) and believes[total - 1:total] == ["the task is done"]:
+            right += 1
+        else:
+            print("    " + "\n    ".join(" ".join(event) for event in events[begin:end]))
+    wanted = 100 if os.environ.get("LONG") else 20
+    claim(1, "missions that ended right", right, f"all {wanted}", right == total == len(believes) == wanted)
+    claim(1, "missions that were interrupted", interrupted, "at least half", interrupted >= total / 2)
+    for what, count in (("goals left running", running), ("goals while another ran", both + rejected),
+                        ("low batteries that were not heeded", unheeded)):
+        claim(1, what, count, "0", count == 0)
 
 
 def row_2():

@@ -1,0 +1,31 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- The paper's mission on a robot that no one here has written (examples/ros-mission/robot.py).
+module Robots.Missions (missions) where
+
+import Control.Monad (void)
+import Data.Aeson (object, (.=))
+import Data.Foldable (for_)
+
+import Behavior
+import Behavior.Ros
+import Behavior.Time (timeout)
+import Robots.Stage
+import RosMission
+
+-- | One after the other; the robot draws the state of its doors, and when its battery falls low.
+missions :: Stage -> Behavior ()
+missions stage = withBridge stage 9090 $ \_ bridge -> withRosWith quickly bridge $ \ros -> do
+  awaitBridge ros
+  let prepare = void (call ros (untypedService "/new_mission" "std_srvs/srv/Trigger") (object []))
+  -- (A bridge that has just started loses calls, and goals, until it knows their servers.)
+  attempt 20 prepare
+  for_ [1 .. if isLong stage then 100 else 20 :: Int] $ \n -> do
+    prepare
+    begun <- clock
+    how <- tryAny (timeout 60 (mission ros))
+    over <- clock
+    note stage 1 ["mission" .= n, "begun" .= begun, "ended" .= over, "how" .= fst (ended how)]
+ where
+  quickly = defaultRosOptions {tooSlowAfter = 1}
