@@ -13,6 +13,7 @@ import qualified Ros.CallSpec
 import qualified Ros.GoalSpec
 import qualified Ros.LinkSpec
 import qualified Ros.MessagesSpec
+import qualified Ros.PeersSpec
 import qualified Ros.TopicSpec
 import qualified SemanticsSpec
 import qualified Sim.ExploreSpaceSpec
@@ -28,6 +29,7 @@ main = hspec $ do
     Trace.MessagesSpec.spec
   describe "Robots" $ do
     Ros.GoalSpec.spec
+    describe "What the peers test of their clients of actions" Ros.PeersSpec.spec
     Ros.TopicSpec.spec
     Ros.LinkSpec.spec
     Ros.CallSpec.spec

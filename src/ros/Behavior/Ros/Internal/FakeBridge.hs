@@ -107,7 +107,8 @@ obey robot it time frame = case decodeRequest (Limits 1048576 64) frame of
           Nothing -> answer it (Response n False "there is no such service")
           Just f -> writeTQueue (newCalls robot) (answerCall it n (f question))
   Right (CancelGoal n _) -> do
-    found <- filter (\g -> idThere g == n) . Map.elems <$> readTVar (goals robot)
+    -- (Another client's goal may have the same id.)
+    found <- filter (\g -> idThere g == n && isBroken (sender g) == isBroken it) . Map.elems <$> readTVar (goals robot)
     for_ found $ \g -> do
       can <- cancel time g
       unless can $ answer it (Complaint (Just n) "there is no such goal")
