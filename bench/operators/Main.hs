@@ -6,7 +6,17 @@
 -- equally. (In a tool that measures each case in one go, it would affect single cases.)
 module Main (main) where
 
-import Control.Concurrent (forkIO, killThread, newEmptyMVar, putMVar, runInUnboundThread, takeMVar, threadDelay, yield)
+import Control.Concurrent
+  ( forkIO
+  , killThread
+  , newEmptyMVar
+  , putMVar
+  , readMVar
+  , runInUnboundThread
+  , takeMVar
+  , threadDelay
+  , yield
+  )
 import Control.Concurrent.Async (Concurrently (..), concurrently_, mapConcurrently_, race, withAsync)
 import Control.Concurrent.STM (TVar, newTVarIO, readTVar, writeTVar)
 import qualified Control.Concurrent.STM as STM
@@ -143,6 +153,7 @@ many waits =
       , about n "allOf" (\size -> void (allOf (replicate size succeeds)))
       , about n "decide" (\size -> decide (\ends -> pure () <$ sequence ends) (replicate size succeeds))
       , about n "scoped, older children end" (olderEnd waits)
+      , about n "scoped, children fork at once" forkAtOnce
       , about n "bare threads, stopped" (stopping . (`take` waits))
       ]
     | n <- [2, 10, 100, 1000]
@@ -176,6 +187,14 @@ olderEnd waits size = scoped $ \nursery -> do
   replicateM_ half (fork nursery succeeds >>= atomically . await)
  where
   half = size `div` 2
+
+-- | The given number of children wait in 'fork' together.
+forkAtOnce :: Int -> Behavior ()
+forkAtOnce size = scoped $ \nursery -> do
+  begin <- newEmptyMVar
+  forking <- replicateM (size `div` 2) . fork nursery $ readMVar begin >> fork nursery succeeds >>= atomically . await
+  putMVar begin ()
+  mapM_ (atomically . await) forking
 
 -- | The lower bound of 'firstOf': threads that are started, wait, and are stopped.
 stopping :: [Behavior ()] -> Behavior ()

@@ -43,7 +43,14 @@ manyBranches =
   operators "Many at once, compared with n/2 times the cost for 2: nanoseconds" $
     concat
       [ [ operator `of'` n `within` 1.2 `times` scaled (n / 2) (operator `of'` 2)
-        | operator <- ["firstOf", "firstOf, the last ends", "allOf", "decide", "scoped, older children end"]
+        | operator <-
+            [ "firstOf"
+            , "firstOf, the last ends"
+            , "allOf"
+            , "decide"
+            , "scoped, older children end"
+            , "scoped, children fork at once"
+            ]
         , n <- [10, 100, 1000]
         ]
       , [operator `of'` 100 `atMost` 60 * microseconds | operator <- ["firstOf", "allOf"]]

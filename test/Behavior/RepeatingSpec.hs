@@ -4,7 +4,7 @@ module Behavior.RepeatingSpec (spec) where
 
 import Control.Concurrent (ThreadId, forkIO, killThread, mkWeakThreadId, yield)
 import Control.Exception
-import Control.Monad (forever, replicateM_, when)
+import Control.Monad (forever, replicateM_, void, when)
 import Data.Foldable (for_, traverse_)
 import Data.IORef
 import Data.Maybe (isJust)
@@ -64,12 +64,16 @@ retries = do
       ending (retrying [delay] failed)
         `shouldReturn` (FaultedWith ("sleep: a duration is zero or more seconds, not " ++ show delay) :: Ending ())
 
-  it "reports each failure but the last, before the pause" $ do
+  it "reports each failure but the last" $ do
     (end, reports) <- observing $ \entries -> do
       n <- newIORef (0 :: Int)
       let act = atomicModifyIORef' n (\k -> (k + 1, k)) >>= failWith . show
       retryingWith (note entries . show) [0, 0] act :: Behavior ()
     (end, reports) `shouldBe` (FailedWith "FailedBecause \"2\"", ["FailedBecause \"0\"", "FailedBecause \"1\""])
+
+  it "reports a failure when it happens" $ do
+    (end, times) <- timed $ \called -> retryingWith (\_ -> void called) [1, 2] (called >> failed)
+    (end, times) `shouldBe` (FailedWith "Failed", [0, 0, 1, 1, 3])
 
   it "gives up when the report throws" $ do
     (end, starts) <- timed $ \started ->
