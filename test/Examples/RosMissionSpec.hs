@@ -108,12 +108,12 @@ missionOn day = withFakeRobot [('/' : name, script name) | name <- names] $ \rob
   let text = fst (ended how)
   -- (What a lost link, or a goal that does not stop, leaves behind is said.)
   unless ("may still" `isInfixOf` text) (oneAtATime events)
-  pure (text, [drop 1 name | (_, GoalCame _ name) <- events])
+  pure (text, [drop 1 name | (_, GoalCame _ name _) <- events])
  where
   names = ["open", "pass_through", "close", "smash", "recharge", "do_task"]
   script name wanted = does day (name ++ " " ++ show (orderOf wanted))
   recharged events =
-    [n | (_, GoalEnded n 4) <- events, (_, GoalCame m "/recharge") <- events, m == n]
+    [n | (_, GoalEnded n 4) <- events, (_, GoalCame m "/recharge" _) <- events, m == n]
 
 -- | The number of the door.
 orderOf :: Value -> Int
@@ -124,7 +124,7 @@ oneAtATime :: [(Seconds, Seen)] -> Behavior ()
 oneAtATime events = unless (inTurn (concatMap (number . snd) events)) $ failWith ("two at a time: " ++ show events)
  where
   number event = case event of
-    GoalCame n _ -> [n]
+    GoalCame n _ _ -> [n]
     GoalEnded n _ -> [n]
     _ -> []
   inTurn (came : end : more) = came == end && inTurn more

@@ -87,7 +87,7 @@ spec = guarded $ do
       mission (const slowly {confirmsWith = Succeeds "a cup"}) $ \robot ros -> do
         inSeconds 10.5 (stopAfter 10 (carrying ros "cup" >> carrying ros "pot")) >>= (`shouldBe` Nothing)
         came <- atomically (seen robot)
-        length [() | (_, GoalCame _ _) <- came] `shouldBe` 1
+        length [() | (_, GoalCame {}) <- came] `shouldBe` 1
     it "that is aborted meanwhile has stopped" . underSchedules 40 $
       mission (const slowly {confirmsWith = Aborts "fell"}) $ \_ ros ->
         inSeconds 10.5 (stopAfter 10 (carrying ros "cup")) >>= (`shouldBe` Nothing)
@@ -144,7 +144,7 @@ spec = guarded $ do
         robot `has` [1]
         try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
         came <- atomically (seen robot)
-        length [() | (_, GoalCame _ _) <- came] `shouldBe` 1
+        length [() | (_, GoalCame {}) <- came] `shouldBe` 1
         sleep 45
         robot `has` []
         void (carrying ros "pot")
@@ -153,7 +153,7 @@ spec = guarded $ do
       void (tried (loseLink robot ||| carrying ros "cup"))
       sleep 5 >> restoreLink robot >> awaitUp ros >> sleep 1
       came <- atomically (seen robot)
-      [time | (time, GoalCame _ _) <- came, time > 0] `shouldBe` []
+      [time | (time, GoalCame {}) <- came, time > 0] `shouldBe` []
     it "a status without goals does not concern a goal that was sent since" . underSchedules 80 $
       mission (named [("cup", slowly), ("pot", slowly {endsAfter = 90})]) $ \robot ros -> do
         let losing = sleep 10 >> loseLink robot >> sleep 5 >> restoreLink robot >> sleepForever

@@ -5,11 +5,11 @@
 -- >>> let server _ = succeeding {endsAfter = 3}
 -- >>> :{
 -- void . simulate . withFakeRobot [("/carry", server)] $ \robot -> withRos (fakeRos robot) $ \ros -> do
---   _ <- goal ros (untyped "/carry" "my_robot/action/Carry") (toRos ())
+--   _ <- goal ros (untyped "/carry" "my_robot/action/Carry") (toRos True)
 --   atomically (seen robot) >>= mapM_ print
 -- :}
 -- (0.0,Connected)
--- (0.0,GoalCame 1 "/carry")
+-- (0.0,GoalCame 1 "/carry" (Bool True))
 -- (3.0,GoalEnded 1 4)
 module Behavior.Ros.Fake
   ( -- * The robot

@@ -89,7 +89,7 @@ obey robot it time frame = case decodeRequest (Limits 1048576 64) frame of
       count <- (+ 1) <$> readTVar (goalCount robot)
       writeTVar (goalCount robot) count
       new <- Goal count it n name (f wanted) <$> newTVar False <*> newTVar False
-      note robot time (GoalCame count (Text.unpack name))
+      note robot time (GoalCame count (Text.unpack name) wanted)
       writeTQueue (newGoals robot) new
       modifyTVar' (goals robot) (Map.insert count new)
   Right (Advertise name _ _) -> note robot time (Advertised (Text.unpack name))

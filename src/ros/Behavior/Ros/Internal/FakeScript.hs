@@ -101,8 +101,8 @@ data Seen
     Published String Value
   | -- | It has called this service.
     Called String Value
-  | -- | The goal with this number came for this action.
-    GoalCame Int String
+  | -- | The goal with this number came for this action: what is to be done.
+    GoalCame Int String Value
   | -- | A cancel of it came; whether it could have an effect.
     CancelCame Int Bool
   | -- | It has ended on the robot, with this status.

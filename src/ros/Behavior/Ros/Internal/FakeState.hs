@@ -93,7 +93,8 @@ publishStatus robot name = do
   running <- filter ((== name) . action) . Map.elems <$> readTVar (goals robot)
   moving <- traverse (\g -> (\stops -> (number g, if stops then 3 else 2)) <$> readTVar (cancelWanted g)) running
   known <- map snd <$> readTVar (record robot)
-  let ended = [(n, status) | GoalEnded n status <- known, GoalCame n (Text.unpack name) `elem` known]
+  let ofAction = [n | GoalCame n action' _ <- known, action' == Text.unpack name]
+      ended = [(n, status) | GoalEnded n status <- known, n `elem` ofAction]
   publishNow robot (statusOf name) . toRos . Statuses $
     [(goalId n, status) | (n, status) <- moving ++ ended]
 
