@@ -14,6 +14,7 @@ import qualified Ros.GoalSpec
 import qualified Ros.LinkSpec
 import qualified Ros.MessagesSpec
 import qualified Ros.PeersSpec
+import qualified Ros.PromisesSpec
 import qualified Ros.TopicSpec
 import qualified SemanticsSpec
 import qualified Sim.ExploreSpaceSpec
@@ -29,6 +30,7 @@ main = hspec $ do
     Trace.MessagesSpec.spec
   describe "Robots" $ do
     Ros.GoalSpec.spec
+    Ros.PromisesSpec.spec
     describe "What the peers test of their clients of actions" Ros.PeersSpec.spec
     Ros.TopicSpec.spec
     Ros.LinkSpec.spec

@@ -5,7 +5,7 @@
 -- > soak 600
 --
 -- The first round is what a release requires, however long it takes: a hundred thousand
--- random schedules of each promise, and as many random programs compared with the
+-- random schedules of each promise and of missions of robots, and as many random programs compared with the
 -- specification, and with their traces. Without a number of seconds only the first round is run.
 module Main (main) where
 
@@ -20,6 +20,7 @@ import Test.QuickCheck (Args (..), Property, isSuccess, numTests, quickCheckWith
 import Promises.Properties
 import Promises.Stage
 import Promises.Trying
+import Ros.Promised (keptByMissions)
 import SemanticsSpec (allThatIsAllowed, onlyWhatIsAllowed)
 import Trace.ProgramsSpec (sinksChangeNothing, tracedRight)
 
@@ -50,13 +51,15 @@ oneRound n = do
       <$> timed "random schedules" (underRandom (1 + 5000 * (n - 1)) 100000 promise)
       <*> timed "all schedules with up to two pre-emptions" (underAll (1 + 300 * (n - 1)) 2 100000 300 promise)
       <* timed "in reality, 500 programs" (inReality (1 + 500 * (n - 1)) 500 promise)
+  putStrLn (promised keptByMissions)
+  missions <- timed "random schedules" (underRandom (1 + 10000 * (n - 1)) 100000 keptByMissions)
   putStrLn "The specification"
   checks "random programs, each run a path of the relation" 100000 onlyWhatIsAllowed
   checks "small programs, both sets of outcomes equal" 500 allThatIsAllowed
   putStrLn "Traces"
   checks "random programs, each with the trace that it must have" 100000 tracedRight
   checks "random programs, with sinks and without" 10000 sinksChangeNothing
-  pure (mconcat tallies)
+  pure (mconcat (missions : tallies))
 
 checks :: String -> Int -> Property -> IO ()
 checks name n prop = do

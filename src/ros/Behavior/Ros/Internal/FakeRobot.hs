@@ -80,7 +80,7 @@ workOn robot it = do
     modifyTVar' (goals robot) (Map.delete (number it))
     note robot time (GoalEnded (number it) status)
     answer (sender it) (Result (idThere it) status values)
-    publishStatus robot (action it)
+    unless refused (publishStatus robot (action it))
  where
   plan = script it
   refused = case endsWith plan of

@@ -21,7 +21,7 @@ module Behavior.Ros.Internal.FakeState
   ) where
 
 import Control.Concurrent.STM
-import Control.Monad (unless, when)
+import Control.Monad (filterM, unless, when)
 import Data.Aeson (Value, object, (.=))
 import Data.ByteString.Lazy (ByteString)
 import Data.Foldable (traverse_)
@@ -87,16 +87,18 @@ answer it what = readTVar (isBroken it) >>= \broken -> unless broken (writeTQueu
 note :: FakeRobot -> Seconds -> Seen -> STM ()
 note robot time what = modifyTVar' (record robot) ((time, what) :)
 
--- | Publishes the status of each goal of the action, as servers do whenever that changes.
+-- | Publishes the status of each goal of the action that was accepted, as servers do whenever that changes.
 publishStatus :: FakeRobot -> Text -> STM ()
 publishStatus robot name = do
-  running <- filter ((== name) . action) . Map.elems <$> readTVar (goals robot)
+  running <- readTVar (goals robot) >>= filterM isRunning . Map.elems
   moving <- traverse (\g -> (\stops -> (number g, if stops then 3 else 2)) <$> readTVar (cancelWanted g)) running
   known <- map snd <$> readTVar (record robot)
   let ofAction = [n | GoalCame n action' _ <- known, action' == Text.unpack name]
-      ended = [(n, status) | GoalEnded n status <- known, n `elem` ofAction]
+      ended = [(n, status) | GoalEnded n status <- known, n `elem` ofAction, status /= 0]
   publishNow robot (statusOf name) . toRos . Statuses $
     [(goalId n, status) | (n, status) <- moving ++ ended]
+ where
+  isRunning g = (action g == name &&) <$> readTVar (isAccepted g)
 
 -- | Publishes a message, and keeps it for those who subscribe later.
 publishNow :: FakeRobot -> Text -> Value -> STM ()

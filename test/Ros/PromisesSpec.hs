@@ -1,0 +1,17 @@
+-- |
+-- Random missions of a robot, each under random schedules.
+--
+-- (That broken goals are rejected is shown by the mutants in test/mutants/Ros.txt.)
+module Ros.PromisesSpec (spec) where
+
+import Test.Hspec
+
+import Promises.Stage (promised)
+import Promises.Trying
+import Ros.Promised
+
+spec :: Spec
+spec =
+  it (promised keptByMissions) $ do
+    tried <- underRandom 1 2000 keptByMissions
+    schedulesExplored tried `shouldSatisfy` (>= 2000)
