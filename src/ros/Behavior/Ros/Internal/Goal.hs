@@ -126,7 +126,8 @@ replacing which = which {preempts = True}
 -- [Result] The goal's.
 -- [Failure] 'Rejected', 'Aborted', 'CancelledByOther'; 'NoServer' if there is no link within
 --   'Behavior.Ros.noServerAfter'; 'StillMoving' if a goal of ours on this action may still run, unless it is
---   'replacing'. (If the server is not there, it waits: 'Behavior.Time.timeout' limits that.)
+--   'replacing'. (If the server is not there, nothing says so, and it waits. Interrupted, it ends with 'NotConfirmed'.
+--   So wait for the server before: where there is none, 'Behavior.Ros.Action.stopAll' fails.)
 -- [Fault] 'LinkLost' at once when the link is lost; 'Undecodable' if the result is not what is expected;
 --   'NotConfirmed' if the server has not confirmed the stop within 'Behavior.Ros.patience'.
 -- [Cancellation] Returns after the robot has confirmed, or with one of these faults. A goal that succeeds all the same
@@ -215,8 +216,8 @@ whyNotConfirmed ros which = atomically $ do
       | otherwise -> "its server says that a goal runs, and is not being cancelled"
     Just (Left why) -> why
     Nothing ->
-      "nothing is known of its server: the bridge has not answered since. Bridges with the fault 909 of rosbridge_suite"
-        ++ " work on a cancel only when the goal has ended"
+      "nothing is known of its server: it is not there, or the bridge has not answered since. Bridges with the fault"
+        ++ " 909 of rosbridge_suite work on a cancel only when the goal has ended"
 
 -- | Registers the goal, and hands it to the writer.
 start :: Ros -> Action a -> Value -> TVar (Maybe Value) -> STM (Text, Sent)
