@@ -54,9 +54,9 @@ spec = guarded $ do
  where
   throughFront = ["open", "pass_through", "close", "do_task"]
   locked these what = if what `elem` these then aborted else slow
-  aborted = slow {endsWith = Aborts "no"}
+  aborted = slow {endsWith = Aborts (object ["sequence" .= [0 :: Int]])}
   failing place name =
-    "the robot failed: mission > " ++ place ++ " > goal: " ++ name ++ ": " ++ name ++ " aborted the goal: no"
+    "the robot failed: mission > " ++ place ++ " > goal: " ++ name ++ ": " ++ name ++ " aborted the goal: {"
   stubborn = slow {endsAfter = 50, confirmsAfter = 1 / 0}
 
 -- | What the robot does with a goal (its action, and the number of the door), and what happens when.

@@ -302,7 +302,7 @@ scriptOf plan wanted =
     , endsAfter = seconds (lasts plan)
     , endsWith = case how plan of
         Succeeding -> Succeeds wanted
-        Aborting -> Aborts wanted
+        Aborting -> Aborts (object ["order" .= wanted])
         Cancelling -> Cancels
         Refusing -> Refuses
     , confirmsAfter = maybe (1 / 0) seconds (confirms plan)

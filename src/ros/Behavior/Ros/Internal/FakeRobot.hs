@@ -79,7 +79,8 @@ workOn robot it = do
     let (status, values) = result how
     modifyTVar' (goals robot) (Map.delete (number it))
     note robot time (GoalEnded (number it) status)
-    answer (sender it) (Result (idThere it) status values)
+    -- (A bridge has no status for a goal that was not accepted.)
+    answer (sender it) (Result (idThere it) (if refused then 6 else status) values)
     unless refused (publishStatus robot (action it))
  where
   plan = script it

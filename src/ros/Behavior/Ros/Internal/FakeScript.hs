@@ -44,7 +44,7 @@ data GoalScript = GoalScript
 data GoalEnd
   = -- | With this result.
     Succeeds Value
-  | -- | The server gives up, and says this.
+  | -- | The server gives up, with this result: an object. (Text is what a bridge says of a goal that was rejected.)
     Aborts Value
   | -- | It has stopped because it was cancelled.
     Cancels

@@ -26,7 +26,7 @@ module Behavior.Ros.Internal.Goal
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, mask, throwIO, try)
 import Control.Monad (unless, void, when)
-import Data.Aeson (Value)
+import Data.Aeson (Value (String))
 import qualified Data.Map.Strict as Map
 import Data.Proxy (Proxy (..))
 import Data.Text (Text)
@@ -195,6 +195,8 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore ->
   conclude how = case how of
     Ended 4 values -> expected which values
     Ended 5 _ -> throwSTM (CancelledByOther name)
+    -- (An action's result is an object. Text is the bridge's, when the goal was not accepted.)
+    Ended 6 (String why) -> throwSTM (Rejected name (Text.unpack why))
     Ended 6 values -> throwSTM (Aborted name (textOf values))
     Ended _ values -> throwSTM (Rejected name (textOf values))
     Complained why -> throwSTM (Rejected name (Text.unpack why))
