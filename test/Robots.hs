@@ -18,6 +18,7 @@ import System.Exit (die)
 import Behavior
 import Behavior.Parallel (firstOf)
 import Behavior.Time (timeout)
+import Robots.Agreeing
 import Robots.Cancelling
 import Robots.Clients
 import Robots.Losing
@@ -37,6 +38,7 @@ rows =
   , (8, silences)
   , (12, twoClients)
   , (13, twoRobots)
+  , (16, agreeing)
   ]
 
 main :: IO ()

@@ -57,6 +57,9 @@ import qualified Paper.ErrataSpec
 import qualified Paper.ListingsSpec
 import qualified Paper.SyntaxSpec
 import qualified Reality.RealitySpec
+import Ros.Bridge (orBridge)
+import Ros.Cases (servers)
+import qualified Ros.CasesSpec
 import qualified Ros.WebsocketSpec
 import qualified Sim.ClaimSpec
 import qualified Sim.DeliverySpec
@@ -73,7 +76,7 @@ import qualified Trace.SinkSpec
 import qualified Trace.TraceSpec
 
 main :: IO ()
-main = hspec $ do
+main = orBridge servers . hspec $ do
   describe "Failure" Behavior.FailureSpec.spec
   describe "Parallel" $ do
     Behavior.ParallelSpec.spec
@@ -131,6 +134,7 @@ main = hspec $ do
     Trace.TraceSpec.spec
     Trace.SinkSpec.spec
   describe "Robots over a websocket" Ros.WebsocketSpec.spec
+  describe "Robots do the same:" Ros.CasesSpec.spec
   describe "Reality" Reality.RealitySpec.spec
   describe "Names" OrdinaryWordsSpec.spec
   describe "The paper" $ do

@@ -4,24 +4,21 @@
 -- The same over a real websocket: a server on this machine, behind which is a fake robot.
 module Ros.WebsocketSpec (spec) where
 
-import Control.Exception (SomeException, bracket, finally, try)
-import Control.Monad (forever, void)
+import Control.Exception (try)
+import Control.Monad (void)
 import Data.Aeson (Value, object, (.=))
-import Network.Socket (Socket, accept, close, socketPort)
-import qualified Network.WebSockets as Websockets
 import Test.Hspec hiding (parallel)
 
 import Behavior
-import Behavior.Parallel (firstOf, fork, scoped)
+import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Link (received)
-import Behavior.Ros.Internal.Service
-import Behavior.Ros.Internal.Transport
 import Behavior.Ros.Messages
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Time
+import Ros.Bridge
 import Ros.Stage
 import Support (guarded)
 
@@ -81,21 +78,4 @@ patient = defaultRosOptions {noServerAfter = 15, patience = 15, pongWithin = 15}
 onSocketWith :: RosOptions -> (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 onSocketWith options script act =
   withFakeRobot [("/carry", script)] $ \robot ->
-    bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
-      port <- socketPort listening
-      -- (The server is there until the mission has ended, cleanup included.)
-      servedBy (serving robot listening) $
-        withRosWith options (rosbridge ("ws://127.0.0.1:" ++ show port)) (act robot)
-
--- | A server that passes on what the fake robot's own bridge says.
-serving :: FakeRobot -> Socket -> Behavior a
-serving robot listening = scoped $ \nursery -> forever $ do
-  (socket, _) <- accept listening
-  fork nursery (void (tryAny (serve socket)) `finally` close socket)
- where
-  serve socket = connecting (fakeRos robot) 1000000 (pure ()) $ \inside -> do
-    outside <- Websockets.makePendingConnection socket Websockets.defaultConnectionOptions >>= Websockets.acceptRequest
-    firstOf . map tryAny $
-      [ forever (Websockets.receiveData outside >>= sendFrame inside)
-      , forever (receiveFrame inside >>= Websockets.sendTextData outside)
-      ] :: Behavior (Either SomeException ())
+    withBridge robot (\address' -> withRosWith options (rosbridge address') (act robot))

@@ -294,6 +294,14 @@ def row_13():
     print(f"row 13: the other robot's goals took {statistics.median(took):.3f} s, at most {max(took):.3f} s")
 
 
+def row_16():
+    cases = [e for e in believed[16] if "case" in e]
+    all_of(16, "cases that end as with fake robots", (e for e in cases if e["gave"] == e["expected"]), cases, 11)
+    for case in cases:
+        if case["gave"] != case["expected"]:
+            print(f"    {case}")
+
+
 for row in ROWS:
     globals()[f"row_{row}"]()
     in_general(row)

@@ -1,0 +1,23 @@
+-- |
+-- A fake robot in a simulation and one behind a bridge in another process do the same. (So does a real one:
+-- @make robots@.)
+module Ros.CasesSpec (spec) where
+
+import Data.Foldable (for_)
+import Test.Hspec
+
+import Behavior.Ros
+import Behavior.Ros.Fake
+import Ros.Bridge
+import Ros.Cases
+import Ros.Stage (underSchedules)
+import Support (guarded)
+
+spec :: Spec
+spec = guarded . for_ cases $ \it' -> describe (title it') $ do
+  it "with a fake robot, under many schedules" . underSchedules 40 . withFakeRobot servers $ \robot -> do
+    let host ros = Host ros (loseLink robot) (restoreLink robot)
+    withRosWith impatient (fakeRos robot) (mission it' . host) >>= (`shouldBe` outcome it')
+  it "with a bridge in another process" . withBridgeProcess $ \way cuts mends -> do
+    let host ros = Host ros cuts mends
+    withRosWith impatient way (mission it' . host) >>= (`shouldBe` outcome it')
