@@ -1,3 +1,4 @@
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE OverloadedStrings #-}
 {-# LANGUAGE ScopedTypeVariables #-}
 
@@ -5,9 +6,10 @@
 -- What a program asks of a robot besides goals: services, parameters, publishing, and stopping everything.
 module Ros.CallSpec (spec) where
 
-import Control.Exception (ErrorCall (..), try)
+import Control.Exception (ArithException (..), ErrorCall (..), throw, try)
 import Control.Monad (void)
 import Data.Aeson (Value (..), object, (.=))
+import qualified Data.Map.Strict as Map
 import Data.Text (Text)
 import Test.Hspec hiding (parallel)
 
@@ -16,6 +18,9 @@ import Behavior.Parallel (allOf, firstOf)
 import Behavior.Ros
 import Behavior.Ros.Action
 import Behavior.Ros.Fake
+import Behavior.Ros.Internal.Frame (Answer (..))
+import Behavior.Ros.Internal.Link (Reply (..), Ros (calls), comeUp, goDown, newRos)
+import qualified Behavior.Ros.Internal.Receive as Receive
 import Behavior.Ros.Messages
 import Behavior.STM
 import qualified Behavior.Signal as Signal
@@ -54,6 +59,35 @@ spec = guarded $ do
       inSeconds 5 (try (call ros lights Null)) >>= (`shouldBe` Left (NoServer "the fake robot"))
     it "returns at once when it is interrupted" . withService (answering 3) $ \_ ros ->
       inSeconds 1 (stopAfter 1 (call ros lights Null)) >>= (`shouldBe` Nothing)
+
+    it "has the first of several answers, whatever comes after it" $ do
+      ros <- newRos "nowhere" defaultRosOptions
+      reply <- newTVarIO Nothing
+      atomically $ do
+        _ <- comeUp ros 0
+        writeTVar (calls ros) (Map.singleton "call 1" reply)
+        Receive.take ros 0 100 (Response "call 1" True "on")
+        Receive.take ros 0 100 (Response "call 1" False "off")
+        Receive.take ros 0 100 (Complaint (Just "call 1") "no")
+        goDown ros "the bridge has ended"
+      readTVarIO reply >>= \case
+        Just (Answered answer) -> answer `shouldBe` "on"
+        _ -> expectationFailure "another answer"
+
+  describe "What is asked" $
+    it "throws where it is used, if it throws: the link stays" . withService (answering 0) $ \_ ros -> do
+      Signal.waitUntil (linkUp ros)
+      let broken = object ["data" .= (throw Overflow :: Int)]
+          overflows act = do
+            try act >>= either (`shouldBe` Overflow) (const (expectationFailure "it returned"))
+            sleep 1
+      overflows (void (call ros lights broken))
+      overflows (void (carrying ros (throw Overflow)))
+      overflows (void (goal ros carry broken))
+      overflows (publishing ros (untypedPublication "/speed" "my_robot/msg/Speed") ($ broken))
+      overflows (publishing ros (untypedPublication (throw Overflow) "my_robot/msg/Speed") (\_ -> pure ()))
+      overflows (void (Signal.read (latest ros (topic ['/', throw Overflow] latched :: Topic Value))))
+      Signal.read (linkUp ros) >>= (`shouldBe` True)
 
   describe "A parameter" $ do
     it "has its value" . withService (answering 0) $ \robot ros -> do

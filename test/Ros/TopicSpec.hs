@@ -5,7 +5,7 @@
 module Ros.TopicSpec (spec) where
 
 import Control.Exception (try)
-import Control.Monad (forM_, void)
+import Control.Monad (forM_, replicateM_, void)
 import Data.Aeson (Value (..), object, (.=))
 import Data.IORef
 import Test.Hspec hiding (parallel)
@@ -14,11 +14,15 @@ import Behavior
 import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
+import Behavior.Ros.Internal.Frame (Answer (..))
+import Behavior.Ros.Internal.Link (comeUp, keptOf, newRos)
+import qualified Behavior.Ros.Internal.Receive as Receive
 import Behavior.Ros.Messages
 import Behavior.STM
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
 import Behavior.Time
+import Memory (inConstantMemory)
 import Ros.Stage
 import Support (guarded)
 
@@ -51,6 +55,11 @@ spec = guarded $ do
       inSeconds 2 (tried (deciding ros)) >>= (`shouldBe` Left silent)
       -- (It has not subscribed again: it would have received the last message again.)
       subscriptions robot >>= (`shouldBe` [0])
+    it "needs no more memory for many messages that no one reads" $ do
+      ros <- newRos "nowhere" defaultRosOptions
+      _ <- atomically (comeUp ros 0 >> keptOf ros "/level" "" 0)
+      inConstantMemory 100000 $ \step ->
+        replicateM_ 100000 (atomically (Receive.take ros 0 100 (Message "/level" Null)) >> step)
     it "that is latched has its value for a second reader, later" . underSchedules 80 . withRobot $ \robot ros -> do
       charge robot (Just 0.5)
       let still = topic "/level" latched :: Topic (Std (Maybe Double))

@@ -112,21 +112,23 @@ untypedService name type' = Service (Text.pack name) (Text.pack type')
 --
 -- @since 0.1.0.0
 call :: RosService a => Ros -> Service a -> Question a -> Behavior (Answer a)
-call ros (Service relative type') question = named ("call: " ++ name) $ mask $ \restore -> do
-  (n, reply) <- handOver ros restore asking
-  (restore (answerTo reply) `finally` atomically (modifyTVar' (calls ros) (Map.delete n))) >>= \case
-    Just (Answered values) -> atomically (either (throwSTM . Undecodable name) pure (decoded values))
-    Just (Refused why) -> throwIO (ServiceFailed name (textOf why))
-    Just NoReply -> atomically (readTVar (link ros) >>= throwSTM . LinkLost (robot ros) . whyLost)
-    Nothing -> throwIO (TooSlow name limit)
+call ros (Service relative type') question = named ("call: " ++ name) $ do
+  (_, _, message) <- inFull (there, type', toRos question)
+  mask $ \restore -> do
+    (n, reply) <- handOver ros restore (asking message)
+    (restore (answerTo reply) `finally` atomically (modifyTVar' (calls ros) (Map.delete n))) >>= \case
+      Just (Answered values) -> atomically (either (throwSTM . Undecodable name) pure (decoded values))
+      Just (Refused why) -> throwIO (ServiceFailed name (textOf why))
+      Just NoReply -> atomically (readTVar (link ros) >>= throwSTM . LinkLost (robot ros) . whyLost)
+      Nothing -> throwIO (TooSlow name limit)
  where
   name = Text.unpack there
   there = absolute ros relative
   limit = tooSlowAfter (rosOptions ros)
   answerTo reply = timeout limit (Just <$> atomically (readTVar reply >>= maybe retry pure)) ? pure Nothing
-  asking = do
+  asking message = do
     n <- Text.pack . ("call " ++) . show <$> newNumber ros
     reply <- newTVar Nothing
-    ask ros (CallService n there type' (toRos question))
+    ask ros (CallService n there type' message)
     modifyTVar' (calls ros) (Map.insert n reply)
     pure (n, reply)

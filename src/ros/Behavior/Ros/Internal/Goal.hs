@@ -183,12 +183,14 @@ expected :: RosMessage b => Action a -> Value -> STM b
 expected which = either (throwSTM . Undecodable (Text.unpack (nameOf which))) pure . decoded
 
 sendGoal :: RosAction a => Ros -> Action a -> Goal a -> TVar (Maybe Value) -> Behavior (Result a)
-sendGoal ros which wanted latest = named ("goal: " ++ name) $ mask $ \restore -> do
-  -- (It is registered and handed over in one transaction: no interruption comes between.)
-  (n, running) <- handOver ros restore (start ros which (toRos wanted) latest)
-  try (restore (atomically (awaitEnd running))) >>= \case
-    Right how -> atomically (conclude how)
-    Left stop -> confirmation ros which n running >>= maybe unconfirmed (afterStop stop)
+sendGoal ros which wanted latest = named ("goal: " ++ name) $ do
+  (_, _, message) <- inFull (nameOf which, typeOf which, toRos wanted)
+  mask $ \restore -> do
+    -- (It is registered and handed over in one transaction: no interruption comes between.)
+    (n, running) <- handOver ros restore (start ros which message latest)
+    try (restore (atomically (awaitEnd running))) >>= \case
+      Right how -> atomically (conclude how)
+      Left stop -> confirmation ros which n running >>= maybe unconfirmed (afterStop stop)
  where
   name = Text.unpack (nameOf which)
   unconfirmed = whyNotConfirmed ros which >>= throwIO . NotConfirmed name

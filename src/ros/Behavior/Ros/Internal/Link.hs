@@ -40,6 +40,7 @@ module Behavior.Ros.Internal.Link
   , mayRun
   , movingGoals
   , endWith
+  , setOnce
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -163,10 +164,7 @@ newRos name options =
     <*> newTVarIO False
     <*> newTVarIO 0
     <*> newTVarIO 1
-    <*> newTVarIO Map.empty
-    <*> newTVarIO Map.empty
-    <*> newTVarIO Map.empty
-    <*> newTVarIO Map.empty
+    <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty
     <*> pure ""
     <*> newTVarIO (frameBytes options)
     <*> newTVarIO 0
@@ -236,7 +234,7 @@ goDown ros why = do
     readTVar (kept ros) >>= traverse_ (\topic -> writeTVar (newest topic) Nothing)
     -- (They stay among those that may still run.)
     readTVar (sent ros) >>= traverse_ (`endWith` Lost)
-    readTVar (calls ros) >>= traverse_ (`writeTVar` Just NoReply)
+    readTVar (calls ros) >>= traverse_ (`setOnce` NoReply)
 
 -- | Throws if the link was lost more often than that, or is no longer used; and gives whether it is up.
 lostSince :: Ros -> Int -> STM Bool
@@ -304,4 +302,8 @@ mayRun ros action = any ((== action) . sentTo) <$> readTVar (sent ros)
 
 -- | Ends the goal, unless it has ended.
 endWith :: Sent -> End -> STM ()
-endWith known how = readTVar (end known) >>= \before -> when (isNothing before) (writeTVar (end known) (Just how))
+endWith = setOnce . end
+
+-- | Of several values only the first counts.
+setOnce :: TVar (Maybe a) -> a -> STM ()
+setOnce known what = readTVar known >>= \before -> when (isNothing before) (writeTVar known (Just what))

@@ -11,9 +11,12 @@ module Behavior.Ros.Internal.Message
   , entry
   , entryOr
   , decoded
+  , inFull
   , textOf
   ) where
 
+import Control.DeepSeq (NFData, force)
+import Control.Exception (evaluate)
 import Data.Aeson (FromJSON, Object, Value (..), encode, parseJSON, toJSON)
 import qualified Data.Aeson.Key as Key
 import Data.Aeson.Types (Parser, explicitParseField, explicitParseFieldMaybe', parseEither)
@@ -27,7 +30,7 @@ import Data.Text.Encoding (decodeUtf8With)
 import Data.Text.Encoding.Error (lenientDecode)
 import Data.Word (Word16, Word32, Word64, Word8)
 
-import Behavior (Seconds)
+import Behavior (Behavior, Seconds)
 
 -- | A type of messages, or of a part of one.
 --
@@ -71,6 +74,10 @@ entryOr absent o name = fromMaybe absent <$> explicitParseFieldMaybe' fromRos o 
 -- | What it is, or why it is not.
 decoded :: RosMessage a => Value -> Either String a
 decoded = parseEither fromRos
+
+-- | All of it, with what the user's code throws in it: here, and not in the link's thread that sends it.
+inFull :: NFData a => a -> Behavior a
+inFull = evaluate . force
 
 -- | What a server says about what it has not done.
 textOf :: Value -> String

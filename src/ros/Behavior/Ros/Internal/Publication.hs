@@ -103,12 +103,15 @@ keepingLast which = which {keepsLast = True}
 -- @since 0.1.0.0
 publishing :: RosMessage a => Ros -> Publication a -> ((a -> Behavior ()) -> Behavior b) -> Behavior b
 publishing ros which behavior = do
+  _ <- inFull (name, typeOf which)
   when (Text.null (typeOf which)) . throwIO . ErrorCall $
     "publishing: " ++ Text.unpack name ++ " needs the name of its type (messageType, or untypedPublication)"
   bracket_ (atomically (begin ros which {nameOf = name})) (atomically (finish ros name)) (behavior publish)
  where
   name = absolute ros (nameOf which)
-  publish message = mask $ \restore -> handOver ros restore (ask ros (Publish name (toRos message)))
+  publish message = do
+    written <- inFull (toRos message)
+    mask $ \restore -> handOver ros restore (ask ros (Publish name written))
 
 -- | One more publisher.
 begin :: Ros -> Publication a -> STM ()

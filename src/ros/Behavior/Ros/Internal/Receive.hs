@@ -40,18 +40,18 @@ takeAnswer ros time answer = case answer of
   Message name value -> do
     topic <- Map.lookup name <$> readTVar (kept ros)
     for_ topic $ \known -> do
-      n <- (+ 1) <$> readTVar (arrivals known)
-      writeTVar (arrivals known) n
+      modifyTVar' (arrivals known) (+ 1)
+      n <- readTVar (arrivals known)
       writeTVar (newest known) (Just (Arrival n time value))
       readTVar (receivers known) >>= traverse_ ($ value)
     traverse_ (`takeStatus` value) (Text.stripSuffix "/_action/status" name)
   -- By its id: the result of another goal, which may come late, is not taken for that of this one.
   Result n status values -> goal n >>= traverse_ (\known -> known `endWith` Ended status values >> forget n)
   Feedback n values -> goal n >>= traverse_ (\known -> writeTVar (feedback known) (Just values))
-  Response n can values -> call n >>= traverse_ (`writeTVar` Just (if can then Answered values else Refused values))
+  Response n can values -> call n >>= traverse_ (`setOnce` if can then Answered values else Refused values)
   Complaint (Just n) why -> do
     called <- call n
-    for_ called (`writeTVar` Just (Refused (String why)))
+    for_ called (`setOnce` Refused (String why))
     goal n >>= \case
       Nothing -> unless (isJust called) . report ros $ "the bridge complains: " ++ Text.unpack why
       Just known ->

@@ -199,9 +199,10 @@ withMessages ros which capacity behavior =
 -- | The topic, subscribed to.
 subscribed :: forall a. RosMessage a => Ros -> Topic a -> Behavior Kept
 subscribed ros which = do
+  (name, type') <- inFull (absolute ros (topicName which), messageType (Proxy :: Proxy a))
   time <- now
   atomically $ do
-    known <- keptOf ros (absolute ros (topicName which)) (messageType (Proxy :: Proxy a)) time
+    known <- keptOf ros name type' time
     known <$ wantBytes ros known (atMostBytes which)
 
 -- | Which messages count.
