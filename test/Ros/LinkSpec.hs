@@ -44,6 +44,12 @@ spec = guarded $ do
       let deep n = Bytes.concat ["{\"op\":\"x\",\"a\":", Chars.replicate (n - 1) '[', Chars.replicate (n - 1) ']', "}"]
       decodeAnswer limits (deep 64) `shouldBe` Right (Other "x")
       decodeAnswer limits (deep 65) `shouldBe` Left "a frame that nests deeper than 64"
+    it "is refused by the digits of a number, but not by those of a text" $ do
+      let digits n = Bytes.concat ["{\"op\":\"x\",\"a\":0.", Chars.replicate n '1', "}"]
+          text n = Bytes.concat ["{\"op\":\"x\",\"a\":\"\\\"", Chars.replicate n '1', "\"}"]
+      decodeAnswer limits {mostBytes = 10000} (digits 1100) `shouldBe` Right (Other "x")
+      decodeAnswer limits {mostBytes = 10000} (digits 1101) `shouldBe` Left "a number of more than 1100 digits"
+      decodeAnswer limits {mostBytes = 10000} (text 5000) `shouldBe` Right (Other "x")
     it "is refused by its size" $ do
       let large n = Bytes.concat ["{\"op\":\"x\"}", Chars.replicate (n - 10) ' ']
       decodeAnswer limits (large 1000) `shouldBe` Right (Other "x")

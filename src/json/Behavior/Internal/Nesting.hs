@@ -1,14 +1,16 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- How deep a text of JSON nests: what is asked of a text from outside before it is parsed.
+-- How deep a text of JSON nests, and how long its numbers are: what is asked of a text before it is parsed.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Nesting
   ( nestsDeeperThan
+  , hasMoreDigitsThan
   ) where
 
 import qualified Data.ByteString.Lazy.Char8 as Bytes
+import Data.Char (isDigit)
 
 -- | Whether brackets nest deeper than that anywhere. To be asked before parsing: a parser needs a few hundred
 -- bytes of memory for each bracket.
@@ -35,3 +37,19 @@ nestsDeeperThan limit content =
 
 -- How deep it is there, and at the deepest place before: outside of a text, within one, or after its backslash.
 data Nesting = Outside !Int !Int | Within !Int !Int | Escaped !Int !Int
+
+-- | Whether more digits than that follow each other anywhere outside of a text. To be asked before parsing: the work
+-- for a number grows with the square of their number.
+hasMoreDigitsThan :: Int -> Bytes.ByteString -> Bool
+hasMoreDigitsThan limit content = Bytes.length content > fromIntegral limit && outside (0 :: Int) content
+ where
+  outside n rest
+    | n > limit = True
+    | otherwise = case Bytes.uncons rest of
+        Nothing -> False
+        Just ('"', more) -> within more
+        Just (c, more) -> outside (if isDigit c then n + 1 else 0) more
+  within rest = case Bytes.uncons (Bytes.dropWhile (\c -> c /= '"' && c /= '\\') rest) of
+    Nothing -> False
+    Just ('"', more) -> outside 0 more
+    Just (_, more) -> within (Bytes.drop 1 more)

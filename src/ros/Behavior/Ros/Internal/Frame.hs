@@ -29,7 +29,7 @@ import Data.Bifunctor (first)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Text (Text)
 
-import Behavior.Internal.Nesting (nestsDeeperThan)
+import Behavior.Internal.Nesting (hasMoreDigitsThan, nestsDeeperThan)
 
 -- | What distinguishes a goal of ours from the others of this link.
 type Id = Text
@@ -146,6 +146,8 @@ decodeFrame limits fields frame = do
   -- Before it is parsed: a parser needs hundreds of bytes for each bracket.
   when (nestsDeeperThan (mostDepth limits) frame) . Left $
     "a frame that nests deeper than " ++ show (mostDepth limits)
+  -- (No 'Double' has more, however it is written.)
+  when (hasMoreDigitsThan 1100 frame) (Left "a number of more than 1100 digits")
   value <- first ("a frame that is no JSON: " ++) (eitherDecode' frame)
   first ("a frame that rosbridge does not have: " ++) $
     parseEither (withObject "a frame" (\o -> o .: "op" >>= fields o)) value
