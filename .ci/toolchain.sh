@@ -26,6 +26,7 @@ libraries=(
   ansi-terminal:libghc-ansi-terminal-dev
   async:libghc-async-dev
   base64-bytestring:libghc-base64-bytestring-dev
+  HsOpenSSL:libghc-hsopenssl-dev
   hspec:libghc-hspec-dev
   HUnit:libghc-hunit-dev
   network:libghc-network-dev

@@ -60,6 +60,7 @@ import qualified Reality.RealitySpec
 import Ros.Bridge (orBridge)
 import Ros.Cases (servers)
 import qualified Ros.CasesSpec
+import qualified Ros.TlsSpec
 import qualified Ros.WebsocketSpec
 import qualified Sim.ClaimSpec
 import qualified Sim.DeliverySpec
@@ -134,6 +135,7 @@ main = orBridge servers . hspec $ do
     Trace.TraceSpec.spec
     Trace.SinkSpec.spec
   describe "Robots over a websocket" Ros.WebsocketSpec.spec
+  describe "Robots over a websocket that is encrypted (wss):" Ros.TlsSpec.spec
   describe "Robots do the same:" Ros.CasesSpec.spec
   describe "Reality" Reality.RealitySpec.spec
   describe "Names" OrdinaryWordsSpec.spec

@@ -4,6 +4,9 @@
 -- A fake robot behind a real websocket: its bridge is a server on this machine, in this process or in another one.
 module Ros.Bridge
   ( withBridge
+  , withBridgeOver
+  , Server
+  , plainly
   , orBridge
   , withBridgeProcess
   ) where
@@ -27,19 +30,30 @@ import Behavior.Ros.Internal.Transport
 -- | Runs the behaviour with a way to the robot's bridge. (The bridge is there until the behaviour has ended, cleanup
 -- included.)
 withBridge :: FakeRobot -> (String -> Behavior a) -> Behavior a
-withBridge robot act =
+withBridge robot act = withBridgeOver plainly robot (\port -> act ("ws://127.0.0.1:" ++ port))
+
+-- | The same, with the port of such a server.
+withBridgeOver :: Server -> FakeRobot -> (String -> Behavior a) -> Behavior a
+withBridgeOver server robot act =
   bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
     port <- socketPort listening
-    servedBy (serving robot listening) (act ("ws://127.0.0.1:" ++ show port))
+    servedBy (serving server robot listening) (act (show port))
+
+-- | How a server begins a connection.
+type Server = Socket -> Behavior Websockets.PendingConnection
+
+-- | Without encryption.
+plainly :: Server
+plainly socket = Websockets.makePendingConnection socket Websockets.defaultConnectionOptions
 
 -- | A server that passes on what the fake robot's own bridge says.
-serving :: FakeRobot -> Socket -> Behavior a
-serving robot listening = scoped $ \nursery -> forever $ do
+serving :: Server -> FakeRobot -> Socket -> Behavior a
+serving server robot listening = scoped $ \nursery -> forever $ do
   (socket, _) <- accept listening
   fork nursery (void (tryAny (serve socket)) `finally` close socket)
  where
   serve socket = connecting (fakeRos robot) 1000000 (pure ()) $ \inside -> do
-    outside <- Websockets.makePendingConnection socket Websockets.defaultConnectionOptions >>= Websockets.acceptRequest
+    outside <- server socket >>= Websockets.acceptRequest
     firstOf . map tryAny $
       [ forever (Websockets.receiveData outside >>= sendFrame inside)
       , forever (receiveFrame inside >>= Websockets.sendTextData outside)

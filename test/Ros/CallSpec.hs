@@ -56,7 +56,7 @@ spec = guarded $ do
     it "fails when there is no link in time" . withService (answering 3) $ \robot ros -> do
       loseLink robot
       Signal.waitUntil (not <$> linkUp ros)
-      inSeconds 5 (try (call ros lights Null)) >>= (`shouldBe` Left (NoServer "the fake robot"))
+      inSeconds 5 (try (call ros lights Null)) >>= (`shouldBe` Left noLink)
     it "returns at once when it is interrupted" . withService (answering 3) $ \_ ros ->
       inSeconds 1 (stopAfter 1 (call ros lights Null)) >>= (`shouldBe` Nothing)
 
@@ -128,7 +128,7 @@ spec = guarded $ do
       loseLink robot
       Signal.waitUntil (not <$> linkUp ros)
       inSeconds 5 (try (publishing ros speeds ($ Std (Just 1))))
-        >>= (`shouldBe` Left (NoServer "the fake robot"))
+        >>= (`shouldBe` Left noLink)
     it "needs a type, and only one" . withRobot $ \_ ros -> do
       errorOf (publishing ros (publication "/x") ($ Null))
         >>= (`shouldBe` "publishing: /x needs the name of its type (messageType, or untypedPublication)")

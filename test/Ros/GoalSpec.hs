@@ -43,7 +43,7 @@ spec = guarded $ do
       awaitUp ros
       loseLink robot
       Signal.waitUntil (not <$> linkUp ros)
-      inSeconds 5 (try (carrying ros "cup")) >>= (`shouldBe` Left (NoServer "the fake robot"))
+      inSeconds 5 (try (carrying ros "cup")) >>= (`shouldBe` Left noLink)
     it "waits for a link that comes in time" . underSchedules 40 $
       withFakeRobot [("/carry", const succeeding)] $ \robot -> do
         loseLink robot

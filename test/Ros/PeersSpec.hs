@@ -95,7 +95,7 @@ spec = guarded $ do
       withFakeRobot [] $ \robot -> do
         loseLink robot
         withRosWith defaultRosOptions {noServerAfter = 0.1} (fakeRos robot) $ \ros ->
-          inSeconds 0.1 (try (dock ros True)) >>= (`shouldBe` Left (NoServer "the fake robot"))
+          inSeconds 0.1 (try (dock ros True)) >>= (`shouldBe` Left noLink)
 
 -- | A robot with a server of nav2's test: it counts with that period, and looks as often whether it is to stop; goals
 -- of these orders it accepts only after a time.

@@ -109,7 +109,7 @@ wrongIn world report goals l =
   (isRefused, isLost, isOther, hasResult) = case outcome l of
     Completed _ -> (False, False, False, True)
     FailedWith (StillMoving _) -> (True, False, False, False)
-    FailedWith (NoServer _) -> (False, False, False, False)
+    FailedWith (NoServer _ _) -> (False, False, False, False)
     FailedWith _ -> (False, False, False, True)
     FaultedWith (LinkLost _ _) -> (False, True, False, False)
     FaultedWith (NotConfirmed _ _) -> (False, False, False, False)

@@ -10,6 +10,8 @@ module Ros.Stage
   , carrying
   , slowly
   , stopAfter
+  , noLink
+  , patient
   , named
   , inSeconds
   ) where
@@ -54,6 +56,14 @@ carrying ros = goal ros carry . String
 -- | Takes a minute; a cancel is confirmed after half a second.
 slowly :: GoalScript
 slowly = succeeding {endsAfter = 60, confirmsAfter = 0.5}
+
+-- | The failure of what has no link to the fake robot in time.
+noLink :: RosFailure
+noLink = NoServer "the fake robot" "user error (connection refused)"
+
+-- | On a machine that is very busy, an answer may take seconds.
+patient :: RosOptions
+patient = defaultRosOptions {noServerAfter = 15, patience = 15, pongWithin = 15}
 
 -- | Stops the behaviour after that time, and gives its result, if it has one all the same.
 stopAfter :: Seconds -> Behavior a -> Behavior (Maybe a)

@@ -127,7 +127,7 @@ spec = guarded $ do
       awaitUp ros
       loseLink robot
       Signal.waitUntil (not <$> linkUp ros)
-      inSeconds 5 (try (deciding ros)) >>= (`shouldBe` Left (NoServer "the fake robot"))
+      inSeconds 5 (try (deciding ros)) >>= (`shouldBe` Left noLink)
   describe "An expected silence" $
     it "is at least a microsecond" $
       withRobot (\_ ros -> void (Signal.read (latest ros (topic "/level" (atLeastEvery 0) :: Topic Value))))

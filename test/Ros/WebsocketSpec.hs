@@ -70,10 +70,6 @@ spec = guarded $ do
 onSocket :: (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 onSocket = onSocketWith patient
 
--- | On a machine that is very busy, an answer may take seconds.
-patient :: RosOptions
-patient = defaultRosOptions {noServerAfter = 15, patience = 15, pongWithin = 15}
-
 -- | A mission whose link is a real websocket.
 onSocketWith :: RosOptions -> (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 onSocketWith options script act =

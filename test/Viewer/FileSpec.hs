@@ -28,10 +28,10 @@ import Behavior.Trace.Summary (renderSummary, summary)
 import Behavior.Trace.Svg (timeline)
 import Behavior.Trace.TraceEvents (renderTraceEvents)
 import Behavior.Trace.Tree (renderTree)
+import Temporary
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
-import Viewer.Temporary
 
 spec :: Spec
 spec = do

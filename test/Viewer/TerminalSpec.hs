@@ -15,11 +15,11 @@ import Behavior.Trace.Terminal
 import Behavior.Trace.Terminal.Live (nothingYet, watch)
 import Behavior.Trace.Terminal.Screen (columns, frame, plain)
 import Behavior.Trace.Terminal.Tree
+import Temporary
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
 import Viewer.Screen
-import Viewer.Temporary
 
 spec :: Spec
 spec = do

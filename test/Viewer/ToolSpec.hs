@@ -17,9 +17,9 @@ import Behavior.Trace.Summary
 import Behavior.Trace.Svg
 import Behavior.Trace.TraceEvents
 import Behavior.Trace.Tree
+import Temporary
 import Tool
 import Viewer.Examples
-import Viewer.Temporary
 
 spec :: Spec
 spec = around withMissions $ do

@@ -17,8 +17,8 @@ import Behavior.Time (sleep)
 import Behavior.Trace
 import Behavior.Trace.File
 import Behavior.Trace.Viewing
+import Temporary
 import Viewer.Examples
-import Viewer.Temporary
 
 spec :: Spec
 spec = do

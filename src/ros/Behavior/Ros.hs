@@ -20,6 +20,7 @@ module Behavior.Ros
     -- ** The way to the robot
   , Transport
   , rosbridge
+  , rosbridgeTrusting
   , rosbridgeAnywhere
 
     -- ** What can be set

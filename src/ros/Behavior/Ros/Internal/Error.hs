@@ -18,8 +18,8 @@ import Behavior (Seconds, behaviorFailedFromException, behaviorFailedToException
 --
 -- @since 0.1.0.0
 data RosFailure
-  = -- | There was no link to this address within 'Behavior.Ros.noServerAfter'.
-    NoServer String
+  = -- | There was no link to this address within 'Behavior.Ros.noServerAfter', and why the latest attempt has failed.
+    NoServer String String
   | -- | The action's server (or the bridge) did not accept the goal; its reason.
     Rejected String String
   | -- | The action's server has given up the goal; what it said.
@@ -38,7 +38,7 @@ instance Exception RosFailure where
   toException = behaviorFailedToException
   fromException = behaviorFailedFromException
   displayException = \case
-    NoServer address -> "no link to " ++ address
+    NoServer address why -> "no link to " ++ address ++ ": " ++ why
     Rejected action why -> action ++ " rejected the goal: " ++ why
     Aborted action why -> action ++ " aborted the goal: " ++ why
     CancelledByOther action -> "the goal of " ++ action ++ " was cancelled, and not by us"

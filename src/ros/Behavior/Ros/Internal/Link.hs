@@ -103,6 +103,8 @@ data Link = Link
   -- ^ How often it has come up.
   , losses :: !Int
   , whyLost :: String
+  , whyDown :: String
+  -- ^ Why it was lost, or why the latest attempt to connect has failed.
   , isClosed :: !Bool
   -- ^ Whether its behaviour has ended.
   }
@@ -159,7 +161,7 @@ data Reply
 newRos :: String -> RosOptions -> IO Ros
 newRos name options =
   Ros name options
-    <$> newTVarIO (Link False 0 0 "" False)
+    <$> newTVarIO (Link False 0 0 "" "it has not connected yet" False)
     <*> newTBQueueIO 256
     <*> newTVarIO False
     <*> newTVarIO 0
@@ -218,17 +220,16 @@ comeUp ros time = do
   pure $
     [Advertise name type' keeps | (name, Advertised type' keeps _) <- Map.toList topicsOfOurs]
       ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
-      ++ [Subscribe (statusOf action) (messageType statuses) | action <- moving]
- where
-  statuses = Proxy :: Proxy Statuses
+      ++ [Subscribe (statusOf action) (messageType (Proxy :: Proxy Statuses)) | action <- moving]
 
 -- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is
 -- never sent.
 goDown :: Ros -> String -> STM ()
 goDown ros why = do
   l <- readTVar (link ros)
+  writeTVar (link ros) l {isUp = False, whyDown = why}
   when (isUp l) $ do
-    writeTVar (link ros) l {isUp = False, losses = losses l + 1, whyLost = why}
+    modifyTVar' (link ros) (\down -> down {losses = losses down + 1, whyLost = why})
     void (flushTBQueue (outgoing ros))
     writeTVar (pingWanted ros) False
     readTVar (kept ros) >>= traverse_ (\topic -> writeTVar (newest topic) Nothing)
@@ -255,7 +256,7 @@ awaitLink ros = do
     l <- readTVar (link ros)
     when (isClosed l) $ throwSTM (LinkLost (robot ros) "its withRos has ended")
     pure (isUp l)
-  noServer = throwSTM (NoServer (robot ros))
+  noServer = readTVar (link ros) >>= throwSTM . NoServer (robot ros) . whyDown
 
 -- | Waits for a link, as 'awaitLink', and runs a transaction that asks the bridge. (Nothing is handed over later than
 -- that: when the link is lost before, it waits again.) To be called masked; so no interruption comes after the

@@ -6,9 +6,11 @@
 -- Internal: any of it may change in any release.
 module Behavior.Ros.Internal.Websocket
   ( rosbridge
+  , rosbridgeTrusting
   , rosbridgeAnywhere
   ) where
 
+import Control.Applicative ((<|>))
 import Control.Monad (guard)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Char (isDigit)
@@ -17,49 +19,72 @@ import Network.WebSockets (ConnectionOptions (..), SizeLimit (..), defaultConnec
 import qualified Network.WebSockets as Websockets
 import Text.Read (readMaybe)
 
+import Behavior.Ros.Internal.Tls
 import Behavior.Ros.Internal.Transport
 
--- | A bridge that speaks rosbridge v2 (rosbridge_suite, for example) on this machine.
+-- | A bridge that speaks rosbridge v2 (rosbridge_suite, for example): on this machine, or on any by an encrypted
+-- connection.
 --
 -- > rosbridge "ws://127.0.0.1:9090"
+-- > rosbridge "wss://robot.example.org:9090"
 --
--- Every program that reaches a bridge can move the robot, and nothing on the way is protected. So other machines than
--- this one are refused with an 'Control.Exception.ErrorCall' (a fault) by 'Behavior.Ros.withRos': use a tunnel, or
--- 'rosbridgeAnywhere'. There is no @wss@ yet.
+-- Every program that reaches a bridge can move the robot. So with @ws@, where nothing on the way is protected, other
+-- machines than this one are refused with an 'Control.Exception.ErrorCall' (a fault) by 'Behavior.Ros.withRos': use
+-- @wss@, a tunnel, or 'rosbridgeAnywhere'.
+--
+-- With @wss@ the bridge has to prove, by a certificate that this system trusts, that it is the host. (Give a name: an
+-- address of numbers, too, is looked for among the names in the certificate.) Otherwise the link does not come up, and
+-- what uses it fails with 'Behavior.Ros.NoServer', which says why. The robot does not check who you are: that is for
+-- the network, or for a proxy before the bridge.
 --
 -- @since 0.1.0.0
 rosbridge :: String -> Transport
-rosbridge = toBridge $ \host ->
+rosbridge = toBridge Nothing $ \host ->
   if host `elem` ["localhost", "::1"] || ("127." `isPrefixOf` host && all (`elem` "0123456789.") host)
     then Nothing
-    else Just ("it is not on this machine; allowed: 127.0.0.1, ::1 and localhost (or rosbridgeAnywhere), not " ++ host)
+    else Just ("it is not on this machine; allowed: 127.0.0.1, ::1, localhost, wss, or rosbridgeAnywhere; not " ++ host)
 
--- | 'rosbridge' on any machine, over a network in which you trust everyone.
+-- | 'rosbridge' that trusts the certificates of this file (PEM), and no others: for a bridge that has signed its own.
+--
+-- > rosbridgeTrusting "robot.pem" "wss://robot.local:9090"
+--
+-- @since 0.1.0.0
+rosbridgeTrusting :: FilePath -> String -> Transport
+rosbridgeTrusting certificates = toBridge (Just certificates) $ \_ ->
+  Just "certificates are for wss://HOST:PORT or wss://HOST:PORT/PATH"
+
+-- | 'rosbridge' on any machine, also with @ws@: over a network in which you trust everyone.
 --
 -- @since 0.1.0.0
 rosbridgeAnywhere :: String -> Transport
-rosbridgeAnywhere = toBridge (const Nothing)
+rosbridgeAnywhere = toBridge Nothing (const Nothing)
 
-toBridge :: (String -> Maybe String) -> String -> Transport
-toBridge refused url = case parts url of
+-- | The file of certificates, what is refused of an address that is not encrypted, and the address.
+toBridge :: Maybe FilePath -> (String -> Maybe String) -> String -> Transport
+toBridge trusted refused url = case parts url of
   Nothing ->
     Transport
       { address = url
-      , refusal = Just ("rosbridge: an address is ws://HOST:PORT or ws://HOST:PORT/PATH, not " ++ show url)
+      , refusal = Just ("rosbridge: an address is ws://HOST:PORT or wss://HOST:PORT (and a /PATH), not " ++ show url)
       , connecting = \_ _ _ -> ioError (userError "no address")
       }
-  Just (host, port, path) ->
+  Just (isEncrypted, host, port, path) ->
     Transport
       { address = url
-      , refusal = ("rosbridge: " ++) <$> refused host
-      , connecting = \bytes received use ->
-          Websockets.runClientWith host port path (limited bytes received) [] $ \connection ->
-            use
-              Connection
-                { receiveFrame = Websockets.receiveData connection
-                , sendFrame = Websockets.sendTextData connection
-                , sendPing = Websockets.sendPing connection Bytes.empty
-                }
+      , refusal = ("rosbridge: " ++) <$> if isEncrypted then Nothing else refused host
+      , connecting = \bytes received use -> do
+          let options = limited bytes received
+              client connection =
+                use
+                  Connection
+                    { receiveFrame = Websockets.receiveData connection
+                    , sendFrame = Websockets.sendTextData connection
+                    , sendPing = Websockets.sendPing connection Bytes.empty
+                    }
+          if isEncrypted
+            then withTls trusted host port $ \stream ->
+              Websockets.runClientWithStream stream (host ++ ":" ++ show port) path options [] client
+            else Websockets.runClientWith host port path options [] client
       }
  where
   -- A larger frame is refused by the link, which goes on; one that is larger than this ends the connection, before it
@@ -72,10 +97,10 @@ toBridge refused url = case parts url of
         , connectionMessageDataSizeLimit = most
         }
 
--- | Host, port and path of an address.
-parts :: String -> Maybe (String, Int, String)
+-- | Whether an address is encrypted; its host, port and path.
+parts :: String -> Maybe (Bool, String, Int, String)
 parts url = do
-  rest <- stripPrefix "ws://" url
+  (isEncrypted, rest) <- ((,) False <$> stripPrefix "ws://" url) <|> ((,) True <$> stripPrefix "wss://" url)
   let (authority, path) = break (== '/') rest
   (host, port) <- case authority of
     '[' : six -> case break (== ']') six of
@@ -87,4 +112,4 @@ parts url = do
   guard (not (null host) && not (null port) && all isDigit port)
   number <- readMaybe port
   guard (number <= 65535)
-  pure (host, number, if null path then "/" else path)
+  pure (isEncrypted, host, number, if null path then "/" else path)

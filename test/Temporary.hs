@@ -1,6 +1,6 @@
 -- |
 -- Files that are gone after an example.
-module Viewer.Temporary
+module Temporary
   ( inFolder
   , withPath
   ) where

@@ -1,0 +1,87 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- A link that is encrypted (wss).
+module Ros.TlsSpec (spec) where
+
+import Control.Exception (try)
+import Data.Aeson (Value)
+import qualified Data.ByteString as Strict
+import Data.Foldable (traverse_)
+import Data.Time (addUTCTime, getCurrentTime)
+import qualified Network.WebSockets as Websockets
+import Network.WebSockets.Stream (makeStream)
+import OpenSSL (withOpenSSL)
+import OpenSSL.PEM (writeX509)
+import OpenSSL.RSA (RSAKeyPair, generateRSAKey')
+import qualified OpenSSL.Session as Tls
+import OpenSSL.X509
+import Test.Hspec
+
+import Behavior
+import Behavior.Ros
+import Behavior.Ros.Fake
+import Ros.Bridge
+import Ros.Stage
+import Support (guarded)
+import Temporary (withPath)
+
+spec :: Spec
+spec = guarded . beforeAll (withOpenSSL (generateRSAKey' 2048 65537)) $ do
+  it "gives the result of a goal, if the bridge's certificate is trusted and names its host" $ \key ->
+    withCertificate key "localhost" $ \file ->
+      over (tlsServer key file) (trusting file) patient $ \ros -> carrying ros "cup" >>= (`shouldBe` "a cup")
+  it "does not come up with a certificate that the system does not trust" $ \key ->
+    withCertificate key "localhost" $ \file ->
+      refusedBy (tlsServer key file) (\port -> rosbridge ("wss://localhost:" ++ port)) "certificate verify failed"
+  it "does not come up with a certificate that names another host" $ \key ->
+    withCertificate key "elsewhere" $ \file ->
+      refusedBy (tlsServer key file) (trusting file) "certificate verify failed"
+  it "does not come up with a bridge that does not encrypt" $ \_ ->
+    refusedBy plainly (\port -> rosbridge ("wss://localhost:" ++ port)) ""
+  it "is required where there are certificates" $ \_ ->
+    withRos (rosbridgeTrusting "robot.pem" "ws://localhost:9090") (\_ -> pure ())
+      `shouldThrow` errorCall "rosbridge: certificates are for wss://HOST:PORT or wss://HOST:PORT/PATH"
+ where
+  trusting file port = rosbridgeTrusting file ("wss://localhost:" ++ port)
+  refusedBy server way why =
+    over server way patient {noServerAfter = 1} $ \ros -> do
+      end <- try (carrying ros "cup")
+      case end of
+        Left (NoServer _ said) -> said `shouldContain` why
+        other -> expectationFailure (show other)
+
+-- | A mission with that server, and that way to its port.
+over :: Server -> (String -> Transport) -> RosOptions -> (Ros -> Behavior a) -> Behavior a
+over server way options act =
+  withFakeRobot [("/carry", const succeeding {endsWith = Succeeds "a cup"})] $ \robot ->
+    withBridgeOver server robot (\port -> withRosWith options (way port) act)
+
+-- | With that key, and the certificate in that file.
+tlsServer :: RSAKeyPair -> FilePath -> Server
+tlsServer key file socket = withOpenSSL $ do
+  context <- Tls.context
+  Tls.contextSetPrivateKey context key
+  Tls.contextSetCertificateFile context file
+  connection <- Tls.connection context socket
+  Tls.accept connection
+  let receive = (\bytes -> if Strict.null bytes then Nothing else Just bytes) <$> Tls.read connection 32768
+  stream <- makeStream receive (traverse_ (Tls.lazyWrite connection))
+  Websockets.makePendingConnectionFromStream stream Websockets.defaultConnectionOptions
+
+-- | With the file of a certificate for that host, which is signed by its own key.
+withCertificate :: RSAKeyPair -> String -> (FilePath -> IO a) -> IO a
+withCertificate key host use = withPath $ \file -> do
+  withOpenSSL $ do
+    certificate <- newX509
+    setVersion certificate 2
+    setSerialNumber certificate 1
+    setIssuerName certificate [("CN", host)]
+    setSubjectName certificate [("CN", host)]
+    time <- getCurrentTime
+    setNotBefore certificate (addUTCTime (-3600) time)
+    setNotAfter certificate (addUTCTime 3600 time)
+    setPublicKey certificate key
+    signX509 certificate key Nothing
+    writeX509 certificate >>= writeFile file
+  use file
