@@ -5,9 +5,10 @@
 module Ros.LinkSpec (spec) where
 
 import Control.Exception (ErrorCall (..), try)
-import Control.Monad (forM_, void)
+import Control.Monad (forM_, replicateM_, void)
 import qualified Data.ByteString.Lazy as Bytes
 import qualified Data.ByteString.Lazy.Char8 as Chars
+import Data.Foldable (traverse_)
 import Data.IORef
 import Data.List (isInfixOf)
 import Test.Hspec hiding (parallel)
@@ -40,6 +41,27 @@ spec = guarded $ do
         said <- reverse <$> readIORef lines'
         forM_ (zip said (map snd hostile)) $ \(line, why) -> line `shouldSatisfy` (why `isInfixOf`)
         length said `shouldBe` length hostile
+    it "is counted also when there are too many lines, each of which is a short one" . underSchedules 10 $ do
+      lines' <- newIORef []
+      let options = defaultRosOptions {onReport = \line -> sleep 1 >> modifyIORef' lines' (line :)}
+          complaint = Bytes.concat ["{\"op\":\"status\",\"msg\":\"no\\nsuch ", Chars.replicate 5000 'x', "\"}"]
+      missionWith options (const slowly) $ \robot ros -> do
+        Signal.waitUntil (linkUp ros)
+        replicateM_ 200 (sendBytes robot complaint)
+        sleep 100
+        sendBytes robot "?"
+        sleep 1.5
+        said <- reverse <$> readIORef lines'
+        head said `shouldBe` "the bridge complains: no such " ++ replicate 170 'x' ++ "..."
+        let leftOut = [read n | line <- said, "(and" : n : _ <- [dropWhile (/= "(and") (words line)]]
+        length said + sum leftOut `shouldBe` 201
+        filter ((> 260) . length) said `shouldBe` []
+    it "is refused where it is an answer that nothing awaits" . underSchedules 10 $
+      missionWith defaultRosOptions (const slowly) $ \robot ros -> do
+        Signal.waitUntil (linkUp ros)
+        traverse_ (sendBytes robot) unawaited
+        sleep 1
+        Signal.read (refusedFrames ros) >>= (`shouldBe` length unawaited)
     it "is refused by its depth before it is parsed" $ do
       let deep n = Bytes.concat ["{\"op\":\"x\",\"a\":", Chars.replicate (n - 1) '[', Chars.replicate (n - 1) ']', "}"]
       decodeAnswer limits (deep 64) `shouldBe` Right (Other "x")
@@ -132,4 +154,14 @@ hostile =
   , (Chars.replicate 1000000 '[', "nests deeper than 64")
   , (Chars.replicate 1048577 ' ', "a frame of 1048577 bytes")
   , ("\255\254", "is no JSON")
+  ]
+
+-- | Frames about what was never asked.
+unawaited :: [Bytes.ByteString]
+unawaited =
+  [ "{\"op\":\"action_result\",\"id\":\"goal 1000\",\"status\":4,\"values\":{}}"
+  , "{\"op\":\"action_feedback\",\"id\":\"goal 1000\",\"values\":{}}"
+  , "{\"op\":\"service_response\",\"id\":\"call 1000\",\"result\":true,\"values\":{}}"
+  , "{\"op\":\"publish\",\"topic\":\"/nowhere\",\"msg\":{}}"
+  , "{\"op\":\"surprise\"}"
   ]

@@ -132,12 +132,13 @@ receivedAny ros = modifyTVar' (received ros) (+ 1)
 reading :: Ros -> Connection -> Behavior a
 reading ros connection = forever $ do
   frame <- receiveFrame connection
+  atomically (receivedAny ros >> writeTVar (isReading ros) True)
   most <- readTVarIO (largestFrame ros)
-  case decodeAnswer (Limits most (frameDepth (rosOptions ros))) frame of
-    Left why -> atomically (receivedAny ros >> refuse ros why)
-    Right answer -> do
-      time <- now
-      atomically (receivedAny ros >> take ros time (fromIntegral (Bytes.length frame)) answer)
+  let answer = decodeAnswer (Limits most (frameDepth (rosOptions ros))) frame
+  time <- either (const (pure 0)) (const now) answer
+  atomically $ do
+    writeTVar (isReading ros) False
+    either (refuse ros) (take ros time (fromIntegral (Bytes.length frame))) answer
 
 -- | Writes these requests first. (A ping goes before all that wait.)
 writing :: Ros -> Connection -> [Request] -> Behavior a
@@ -150,12 +151,14 @@ writing ros connection first = do
     (Nothing <$ (readTVar (pingWanted ros) >>= check >> writeTVar (pingWanted ros) False))
       `orElse` (Just <$> readTBQueue (outgoing ros))
 
--- | Asks whether the bridge is there. Anything that comes is an answer.
+-- | Asks whether the bridge is there. Anything that comes is an answer. (While a frame is being read, answers wait
+-- behind it.)
 pinging :: Ros -> Behavior a
 pinging ros = forever $ do
   sleep (pingEvery options)
   before <- atomically (writeTVar (pingWanted ros) True >> readTVar (received ros))
-  timeout (pongWithin options) (atomically (readTVar (received ros) >>= check . (/= before)))
+  timeout (pongWithin options) (atomically (anyAfter before >>= check))
     ? throwIO (LinkEnds ("nothing was received within " ++ show (pongWithin options) ++ " s after a ping"))
  where
   options = rosOptions ros
+  anyAfter before = (||) <$> readTVar (isReading ros) <*> ((/= before) <$> readTVar (received ros))

@@ -78,6 +78,8 @@ data Ros = Ros
   , pingWanted :: TVar Bool
   , received :: TVar Int
   -- ^ How often anything was received.
+  , isReading :: TVar Bool
+  -- ^ Whether a frame is being read: one of some megabytes takes seconds.
   , nextNumber :: TVar Int
   -- ^ Of goals, calls and receivers.
   , kept :: TVar (Map Text Kept)
@@ -94,6 +96,8 @@ data Ros = Ros
   -- ^ How many bytes a frame has at most, whatever it is.
   , refused :: TVar Int
   , reports :: TBQueue String
+  , leftOut :: TVar Int
+  -- ^ How many reports were left out since the last of these.
   }
 
 -- | Whether the link is up, and its past.
@@ -163,14 +167,13 @@ newRos name options =
   Ros name options
     <$> newTVarIO (Link False 0 0 "" "it has not connected yet" False)
     <*> newTBQueueIO 256
-    <*> newTVarIO False
-    <*> newTVarIO 0
+    <*> newTVarIO False <*> newTVarIO 0 <*> newTVarIO False
     <*> newTVarIO 1
     <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty
     <*> pure ""
     <*> newTVarIO (frameBytes options)
     <*> newTVarIO 0
-    <*> newTBQueueIO 64
+    <*> newTBQueueIO 64 <*> newTVarIO 0
 
 -- | The link, for names of a robot: a topic, action, service or node whose name does not begin with a slash is in this
 -- namespace.
@@ -196,7 +199,8 @@ absolute ros name
 linkUp :: Ros -> Signal Bool
 linkUp ros = named "link up" (watching (isUp <$> readTVar (link ros)))
 
--- | How many frames were refused: too large, too deep, no JSON, or none of rosbridge.
+-- | How many frames were refused: too large, too deep, no JSON, none of rosbridge, or an answer that nothing awaits
+-- (also one that comes too late).
 --
 -- @since 0.1.0.0
 refusedFrames :: Ros -> Signal Int
@@ -232,6 +236,7 @@ goDown ros why = do
     modifyTVar' (link ros) (\down -> down {losses = losses down + 1, whyLost = why})
     void (flushTBQueue (outgoing ros))
     writeTVar (pingWanted ros) False
+    writeTVar (isReading ros) False
     readTVar (kept ros) >>= traverse_ (\topic -> writeTVar (newest topic) Nothing)
     -- (They stay among those that may still run.)
     readTVar (sent ros) >>= traverse_ (`endWith` Lost)
@@ -264,9 +269,8 @@ awaitLink ros = do
 handOver :: Ros -> (forall b. Behavior b -> Behavior b) -> STM a -> Behavior a
 handOver ros restore asking = do
   restore (awaitLink ros)
+  let whenDown = readTVar (link ros) >>= check . not . isUp
   atomically ((Just <$> asking) `orElse` (Nothing <$ whenDown)) >>= maybe (handOver ros restore asking) pure
- where
-  whenDown = readTVar (link ros) >>= check . not . isUp
 
 -- | Asks the bridge. Retries while too much waits to be sent, and while the link is down.
 ask :: Ros -> Request -> STM ()

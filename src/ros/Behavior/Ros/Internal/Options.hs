@@ -26,8 +26,9 @@ data RosOptions = RosOptions
   , pongWithin :: Seconds
   -- ^ How long anything may take to come after that, or the link is lost; 1 s by default.
   , frameBytes :: Int
-  -- ^ How many bytes a frame from the bridge has at most, or it is refused; 1 MiB by default. (For the messages of
-  -- one topic: 'Behavior.Ros.upToBytes'.)
+  -- ^ How many bytes a frame from the bridge has at most, or it is refused; 1 MiB by default. (It takes up to 0.4 s and
+  -- 100 MB to read so much, if it is full of the smallest values. For the messages of one topic:
+  -- 'Behavior.Ros.upToBytes'.)
   , frameDepth :: Int
   -- ^ How deep the brackets in a frame nest at most, or it is refused; 64 by default.
   , firstPause :: Seconds
@@ -36,7 +37,8 @@ data RosOptions = RosOptions
   -- ^ The longest such pause; 1 s by default.
   , onReport :: String -> Behavior ()
   -- ^ What is done with a line about a frame that was refused, or about a complaint of the bridge; nothing by default.
-  -- (If it is too slow for them, lines are left out.)
+  -- (A line has at most some 250 characters. If this is too slow for them, lines are left out, and the next one says
+  -- how many.)
   }
 
 -- | The defaults that are documented for each field of 'RosOptions'.

@@ -14,9 +14,10 @@ module Behavior.Ros.Internal.Receive
 import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (unless, when)
 import Data.Aeson (Value (String))
+import Data.Char (isPrint)
 import Data.Foldable (for_, toList, traverse_)
 import qualified Data.Map.Strict as Map
-import Data.Maybe (isJust)
+import Data.Maybe (isJust, isNothing)
 import qualified Data.Text as Text
 import Prelude hiding (take)
 
@@ -44,11 +45,17 @@ takeAnswer ros time answer = case answer of
       n <- readTVar (arrivals known)
       writeTVar (newest known) (Just (Arrival n time value))
       readTVar (receivers known) >>= traverse_ ($ value)
-    traverse_ (`takeStatus` value) (Text.stripSuffix "/_action/status" name)
+    case Text.stripSuffix "/_action/status" name of
+      -- (That is subscribed to also where no signal has asked for it.)
+      Just action -> takeStatus action value
+      Nothing -> when (isNothing topic) (unawaited "a message on" name)
   -- By its id: the result of another goal, which may come late, is not taken for that of this one.
-  Result n status values -> goal n >>= traverse_ (\known -> known `endWith` Ended status values >> forget n)
-  Feedback n values -> goal n >>= traverse_ (\known -> writeTVar (feedback known) (Just values))
-  Response n can values -> call n >>= traverse_ (`setOnce` if can then Answered values else Refused values)
+  Result n status values ->
+    goal n >>= maybe (unawaited "a result for" n) (\known -> known `endWith` Ended status values >> forget n)
+  Feedback n values ->
+    goal n >>= maybe (unawaited "feedback for" n) (\known -> writeTVar (feedback known) (Just values))
+  Response n can values ->
+    call n >>= maybe (unawaited "an answer to" n) (`setOnce` if can then Answered values else Refused values)
   Complaint (Just n) why -> do
     called <- call n
     for_ called (`setOnce` Refused (String why))
@@ -58,8 +65,10 @@ takeAnswer ros time answer = case answer of
         -- (It may be about a cancel that came too early, and the goal goes on.)
         readTVar (cancelled known) >>= \is -> unless is (known `endWith` Complained why >> forget n)
   Complaint Nothing why -> report ros ("the bridge complains: " ++ Text.unpack why)
-  Other _ -> pure ()
+  Other "status" -> pure ()
+  Other name -> refuse ros ("a frame that rosbridge does not send: op " ++ show name)
  where
+  unawaited what n = refuse ros (what ++ " " ++ show n ++ ", which nothing awaits")
   goal n = Map.lookup n <$> readTVar (sent ros)
   call n = Map.lookup n <$> readTVar (calls ros)
   forget n = modifyTVar' (sent ros) (Map.delete n)
@@ -74,5 +83,18 @@ takeAnswer ros time answer = case answer of
 refuse :: Ros -> String -> STM ()
 refuse ros why = modifyTVar' (refused ros) (+ 1) >> report ros ("refused: " ++ why)
 
+-- | Hands the line to the user; or counts it, if too many wait.
 report :: Ros -> String -> STM ()
-report ros line = isFullTBQueue (reports ros) >>= \full -> unless full (writeTBQueue (reports ros) line)
+report ros line = do
+  full <- isFullTBQueue (reports ros)
+  if full then modifyTVar' (leftOut ros) (+ 1) else swapTVar (leftOut ros) 0 >>= (writeTBQueue (reports ros) $!) . with
+ where
+  with n = if n == 0 then brief line else brief line ++ " (and " ++ show n ++ " lines before it were left out)"
+
+-- | One line that is not long, whatever the bridge has put into it; and nothing else of the frame is kept for it.
+brief :: String -> String
+brief line = foldr (strictly . printable) (if null rest then "" else "...") start
+ where
+  strictly c later = c `seq` later `seq` c : later
+  (start, rest) = splitAt 200 line
+  printable c = if isPrint c then c else ' '
