@@ -21,6 +21,7 @@ import Behavior.Time (timeout)
 import Robots.Agreeing
 import Robots.Cancelling
 import Robots.Clients
+import Robots.Lies
 import Robots.Losing
 import Robots.Missions
 import Robots.Stage
@@ -36,6 +37,8 @@ rows =
   , (6, halfOpen)
   , (7, restarted)
   , (8, silences)
+  , (9, floods)
+  , (10, hostile)
   , (12, twoClients)
   , (13, twoRobots)
   , (16, agreeing)

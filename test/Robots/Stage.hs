@@ -16,6 +16,7 @@ module Robots.Stage
   , Bridge
   , onPort
   , withBridge
+  , withLies
   , startBridge
   , awaitBridge
   , signalBridge
@@ -28,7 +29,7 @@ module Robots.Stage
 
 import Control.Concurrent.MVar
 import Control.Exception (bracket, uninterruptibleMask_)
-import Control.Monad ((>=>))
+import Control.Monad (void, (>=>))
 import Data.Aeson (encode, object, (.=))
 import Data.Aeson.Types (Pair)
 import qualified Data.ByteString.Lazy.Char8 as Bytes
@@ -94,6 +95,16 @@ withBridge stage port use =
   bracket (Bridge port <$> newIORef Nothing) (endBridge sigKILL) $ \bridge -> do
     startBridge stage bridge
     use bridge (rosbridge ("ws://127.0.0.1:" ++ show port))
+
+-- | While the behaviour runs, a bridge that is none, in a process of its own, which reads this one's memory:
+-- @test/robots/bridge.py@ with these arguments.
+withLies :: Stage -> [String] -> (Transport -> Behavior a) -> Behavior a
+withLies stage arguments use = do
+  output <- openFile (folder stage ++ "/servers") AppendMode
+  let python = proc "python3" (["test/robots/bridge.py", "9099", folder stage] ++ arguments)
+      begin = createProcess python {std_in = NoStream, std_out = UseHandle output, std_err = UseHandle output}
+      end (_, _, _, process) = terminateProcess process >> void (waitForProcess process)
+  bracket begin end (\_ -> use (rosbridge "ws://127.0.0.1:9099"))
 
 -- | Starts it. (It is there some 0.2 s later.)
 startBridge :: Stage -> Bridge -> IO ()

@@ -1,7 +1,7 @@
 """Says how each row went: compares what the program believes with what the action servers have recorded.
 
-judge.py FOLDER ROW...: the folder has the files "record" (of the servers) and "believed" (of the program). A line for
-each claim; the exit code is 1 if any has failed.
+judge.py FOLDER ROW...: the folder has the files "record" (of the servers), "lies" (of bridges that are none, in
+bridge.py) and "believed" (of the program). A line for each claim; the exit code is 1 if any has failed.
 """
 
 import collections
@@ -23,6 +23,13 @@ believed = collections.defaultdict(list)
 for line in open(FOLDER + "/believed"):
     entry = json.loads(line)
     believed[entry["row"]].append(entry)
+
+# What each bridge that is none has recorded, by what it was started for.
+lies_of = collections.defaultdict(list)
+if os.path.exists(FOLDER + "/lies"):
+    for line in open(FOLDER + "/lies"):
+        entry = json.loads(line)
+        lies_of[entry["mode"]].append(entry)
 
 ENDS = ("canceled", "succeeded", "aborted", "rejected")
 failed = 0
@@ -275,6 +282,98 @@ def row_8():
 
 def published_before(entry, when):
     return entry["what"] == "falling silent" and entry["begun"] <= when <= entry["ended"]
+
+
+def row_9():
+    lies = lies_of["flood"]
+    end = next((e for e in lies if e["event"] == "end"), None)
+    if not end:
+        return claim(9, "the flood", "none", "some", False)
+    rate = end["sent"] / end["took"]
+    claim(9, "messages a second, sent by another process", f"{rate:.0f}", "at least 9900", rate >= 9900)
+    for name in ("fast", "slow"):
+        one = next((e for e in believed[9] if e.get("reader") == name), None)
+        if not one:
+            claim(9, f"{name} reader", "none", "one", False)
+            continue
+        total = one["handled"] + one["waiting"] + one["dropped"]
+        counts = ", ".join(f"{one[what]} {what}" for what in ("handled", "waiting", "dropped"))
+        claim(9, f"{name} reader: {counts}: together", total, f"{end['sent']}", total == end["sent"])
+        claim(9, f"{name} reader: messages that were not later than the one before", one["disorder"], "0",
+              one["disorder"] == 0)
+        if name == "slow":
+            claim(9, "slow reader: dropped", one["dropped"], "some", one["dropped"] > 0)
+    begun = next(e["at"] for e in lies if e["event"] == "begin")
+    memory = [e["most"] / 1e6 for e in lies if e["event"] == "memory" and begun + 1 < e["at"] <= end["at"]]
+    third = len(memory) // 3
+    early, late = statistics.median(memory[:third]), statistics.median(memory[-third:])
+    claim(9, "memory in the first and the last third", f"{early:.1f} and {late:.1f} MB", "within 10 %",
+          late <= 1.1 * early)
+    took = [e["took"] for e in lies if e["event"] == "reaction"]
+    print(f"row 9: reactions to another topic: median {statistics.median(took) * 1000:.1f} ms, "
+          f"longest {max(took) * 1000:.1f} ms")
+    claim(9, "reactions", len(took), "50 a second", len(took) >= 49 * end["took"])
+    at_most(9, "reactions: 99th percentile", percentile(took, 0.99), 0.05)
+    claim(9, "connections", connections(lies), "1", connections(lies) == 1)
+    for load in (e for e in believed[9] if "rate" in e):
+        sent = [event for _, event in record[load["rate"]]]
+        print(f"row 9: the real bridge: of {load['wanted']} messages, sent at {sent[-1] if sent else '?'} a second, "
+              f"{load['arrived']} arrived; the link: {load['end']}")
+
+
+def connections(lies):
+    return sum(e["event"] == "connected" for e in lies)
+
+
+def row_10():
+    lies = lies_of["hostile"]
+    beside = [e for e in lies if e["event"] == "memory"]
+    frames = [e for e in lies if e["event"] == "frame"]
+    alone = [e for e in frames if e["alone"]]
+    sent = sum(e["kind"] != "allowed" for e in frames)
+    claim(10, "frames, sent by another process", sent, "10000", sent == 10000)
+    wrong = [e for e in alone if e["answer"] is None or not is_answer(e["answer"], e["wanted"])]
+    claim(10, "answered otherwise than by one short line, or the right judgement", len(wrong), "0", not wrong)
+    for kind, n in collections.Counter(e["kind"] for e in wrong).items():
+        example = next(e for e in wrong if e["kind"] == kind)
+        print(f"    {n} {kind}: for example {str(example['answer'])[:200]!r}, instead of {example['wanted']}")
+    took, calm = collections.defaultdict(list), [e for e in alone if is_calm(beside, e)]
+    for e in calm:
+        took[e["kind"]].append(e["heard"] - e["sent"])
+    allowed = took.pop("allowed", [])
+    slowest = max(took, key=lambda kind: max(took[kind]))
+    every = [seconds for some in took.values() for seconds in some]
+    print(f"row 10: answered after {statistics.median(every) * 1000:.2f} ms (median); slowest: {slowest}")
+    longest = max(e["heard"] - e["sent"] for e in alone if e["heard"] and e["kind"] != "allowed")
+    print(f"row 10: {len(calm)} of {len(alone)} came while no thread beside it was late by 10 ms; of all the longest "
+          f"took {longest * 1000:.1f} ms")
+    at_most(10, "from when all of it was sent until the answer was there", max(every), 0.05)
+    claim(10, "frames in calm times", len(every), "at least a third", len(every) >= 3000)
+    refused = [e for e in frames if e["wanted"] == "line" and e["kind"] not in ("complaints", "allowed")]
+    counted = next((e["refused"] for e in believed[10] if "refused" in e), None)
+    claim(10, "refused, and counted", counted, len(refused), counted == len(refused))
+    begin, end = (next((e["at"] for e in lies if e["event"] == event), 0) for event in ("begin", "end"))
+    memory = [(e["ended"], e["most"] / 1e6) for e in beside]
+    before = statistics.median(most for at, most in memory if at < begin)
+    more = max(most for at, most in memory if at < end + 0.1) - before
+    if allowed:
+        print(f"row 10: frames of 1 MiB, which is allowed, full of the smallest values: {max(allowed) * 1000:.0f} ms")
+    claim(10, f"memory: {before:.1f} MB, and then at most more", f"{more:.1f} MB", "under 50 MB", more < 50)
+    completed = [g for g in goals(10) if g["outcome"] == "completed"]
+    all_of(10, "goals that ran meanwhile: completed with their own result", completed, goals(10), 2)
+    claim(10, "connections", connections(lies), "1", connections(lies) == 1)
+
+
+def is_calm(beside, entry):
+    """Whether it was answered while the machine had time: no sleeping thread of another process was late by 10 ms."""
+    return entry["heard"] and all(
+        e["late"] < 0.01 for e in beside if e["begun"] < entry["heard"] and entry["sent"] < e["ended"])
+
+
+def is_answer(answer, wanted):
+    if wanted == "line":
+        return answer not in ("True", "False") and len(answer.splitlines()) == 1 and 10 <= len(answer) <= 300
+    return answer == wanted
 
 
 def row_12():
