@@ -136,6 +136,17 @@ spec = guarded $ do
       let act = inSeconds 10.5 (tried (stopAfter 10 (carrying ros "cup")))
       lost <- firstOf [sleep 10.5 >> loseLink robot >> sleepForever, act]
       lost `shouldBe` Left linkLost
+    it "a goal that its server accepts after a new connection is not taken for an ended one" . underSchedules 40 $ do
+      let slowToAccept = succeeding {acceptedAfter = 1.5, endsAfter = 8}
+      -- (The server has accepted one before, so that it has a status.)
+      mission (named [("first", succeeding), ("cup", slowToAccept)]) $ \robot ros -> do
+        void (carrying ros "first")
+        let losing = sleep 0.1 >> loseLink robot >> sleep 0.3 >> restoreLink robot >> sleepForever
+        _ <- firstOf [losing, tried (carrying ros "cup") <* awaitUp ros]
+        sleep 0.5
+        try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
+        Signal.waitUntil ((== 0) <$> movingGoals ros)
+        atomically (runningGoals robot) >>= (`shouldBe` [])
     it "goals are not sent again, and new ones are refused while the old one runs" . underSchedules 80 $
       mission (const slowly) $ \robot ros -> do
         let losing = sleep 10 >> loseLink robot >> sleep 5 >> restoreLink robot >> sleepForever

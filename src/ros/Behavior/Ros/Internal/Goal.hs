@@ -39,6 +39,7 @@ import Behavior.Ros.Internal.Frame (Request (..))
 import Behavior.Ros.Internal.Link hiding (feedback)
 import Behavior.Ros.Internal.Message
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Sent
 import Behavior.Ros.Internal.Status
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal, watching)
@@ -135,8 +136,9 @@ replacing which = which {preempts = True}
 --
 -- With 'NotConfirmed' and 'LinkLost' /the robot may still move/ when the operator goes on: so a
 -- 'Behavior.Signal.monitor' may start its recovery while it does. Such goals are counted ('Behavior.Ros.movingGoals')
--- until the server says that they have ended; after a new connection that it has no goal left. Until then a new goal
--- on that action is refused with 'StillMoving'.
+-- until the server says that they have ended: after a new connection, that it has no goal left, and that not before
+-- 'Behavior.Ros.patience' (it may not have accepted the goal yet). Until then a new goal on that action is refused
+-- with 'StillMoving'.
 --
 -- >>> let carry = untyped "/carry" "my_robot/action/Carry"
 -- >>> let server _ = succeeding {endsAfter = 60, confirmsAfter = 0.5}
@@ -230,7 +232,7 @@ start ros which wanted latest = do
   when (before && not (preempts which)) $ throwSTM (StillMoving (Text.unpack (nameOf which)))
   n <- newNumber ros
   connection <- connections <$> readTVar (link ros)
-  running <- Sent (nameOf which) connection <$> newTVar Nothing <*> newTVar False <*> pure latest
+  running <- newSent (nameOf which) connection latest
   let name = "goal " <> Text.pack (show n)
   ask ros (SendGoal name (nameOf which) (typeOf which) wanted)
   modifyTVar' (sent ros) (Map.insert name running)

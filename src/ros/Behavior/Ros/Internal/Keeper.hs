@@ -101,7 +101,7 @@ connected ros transport = do
         first <- atomically (writeTVar up True >> comeUp ros time)
         -- (A trace shows when the link was there, and why no longer.)
         named ("link: " ++ robot ros) $
-          firstOf (map whyItEnds [reading ros connection, writing ros connection first, pinging ros])
+          firstOf (map whyItEnds [reading ros connection, writing ros connection first, pinging ros, settling ros])
             >>= throwIO . LinkEnds
       connecting' = connecting transport (frameBytes (rosOptions ros)) (atomically (receivedAny ros)) use
       tooLong = do
@@ -150,6 +150,10 @@ writing ros connection first = do
   next =
     (Nothing <$ (readTVar (pingWanted ros) >>= check >> writeTVar (pingWanted ros) False))
       `orElse` (Just <$> readTBQueue (outgoing ros))
+
+-- | Waits until the link is settled.
+settling :: Ros -> Behavior a
+settling ros = sleep (patience (rosOptions ros)) >> atomically (settle ros) >> sleepForever
 
 -- | Asks whether the bridge is there. Anything that comes is an answer. (While a frame is being read, answers wait
 -- behind it.)

@@ -19,6 +19,7 @@ module Behavior.Ros.Internal.Link
     -- * Up and down
   , comeUp
   , goDown
+  , settle
   , awaitLink
   , handOver
   , ask
@@ -34,13 +35,9 @@ module Behavior.Ros.Internal.Link
   , Arrival (..)
   , keptOf
   , wantBytes
-  , Sent (..)
-  , End (..)
   , Reply (..)
   , mayRun
   , movingGoals
-  , endWith
-  , setOnce
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -50,7 +47,6 @@ import Data.Foldable (for_, traverse_)
 import Data.List (nub)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
-import Data.Maybe (isNothing)
 import Data.Proxy (Proxy (..))
 import Data.Text (Text)
 import qualified Data.Text as Text
@@ -60,6 +56,7 @@ import Behavior.Ros.Internal.Error
 import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Message (messageType)
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Sent
 import Behavior.Ros.Internal.Status (Statuses, statusOf)
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal, named, watching)
@@ -103,6 +100,8 @@ data Ros = Ros
 -- | Whether the link is up, and its past.
 data Link = Link
   { isUp :: !Bool
+  , isSettled :: !Bool
+  -- ^ Whether it has been up for the patience: what was sent over an earlier connection has come to its server.
   , connections :: !Int
   -- ^ How often it has come up.
   , losses :: !Int
@@ -137,24 +136,6 @@ data Arrival = Arrival
   , arrived :: Value
   }
 
--- | A goal that was sent.
-data Sent = Sent
-  { sentTo :: Text
-  -- ^ The action.
-  , sentIn :: !Int
-  -- ^ The number of the connection.
-  , end :: TVar (Maybe End)
-  , cancelled :: TVar Bool
-  -- ^ Whether we have asked the robot to cancel it.
-  , feedback :: TVar (Maybe Value)
-  }
-
--- | How a goal ended, as far as we know.
-data End
-  = Ended !Int Value
-  | Complained Text
-  | Lost
-
 -- | What a service has answered.
 data Reply
   = Answered Value
@@ -165,7 +146,7 @@ data Reply
 newRos :: String -> RosOptions -> IO Ros
 newRos name options =
   Ros name options
-    <$> newTVarIO (Link False 0 0 "" "it has not connected yet" False)
+    <$> newTVarIO (Link False False 0 0 "" "it has not connected yet" False)
     <*> newTBQueueIO 256
     <*> newTVarIO False <*> newTVarIO 0 <*> newTVarIO False
     <*> newTVarIO 1
@@ -216,11 +197,13 @@ movingGoals ros = named "moving goals" (watching (Map.size <$> readTVar (sent ro
 -- | The link is up: gives what is to be asked first. (Goals are never sent again.)
 comeUp :: Ros -> Seconds -> STM [Request]
 comeUp ros time = do
-  modifyTVar' (link ros) (\l -> l {isUp = True, connections = connections l + 1})
+  modifyTVar' (link ros) (\l -> l {isUp = True, isSettled = False, connections = connections l + 1})
   topics <- readTVar (kept ros)
   for_ topics (\topic -> writeTVar (askedAt topic) time)
   topicsOfOurs <- readTVar (advertised ros)
-  moving <- nub . map sentTo . Map.elems <$> readTVar (sent ros)
+  before <- Map.elems <$> readTVar (sent ros)
+  for_ before (\known -> writeTVar (isAbsent known) False)
+  let moving = nub (map sentTo before)
   pure $
     [Advertise name type' keeps | (name, Advertised type' keeps _) <- Map.toList topicsOfOurs]
       ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
@@ -241,6 +224,13 @@ goDown ros why = do
     -- (They stay among those that may still run.)
     readTVar (sent ros) >>= traverse_ (`endWith` Lost)
     readTVar (calls ros) >>= traverse_ (`setOnce` NoReply)
+
+-- | The link has been up for the patience. Goals of earlier connections that are absent have ended.
+settle :: Ros -> STM ()
+settle ros = do
+  modifyTVar' (link ros) (\l -> l {isSettled = True})
+  absent <- readTVar (sent ros) >>= traverse (readTVar . isAbsent)
+  modifyTVar' (sent ros) (`Map.difference` Map.filter id absent)
 
 -- | Throws if the link was lost more often than that, or is no longer used; and gives whether it is up.
 lostSince :: Ros -> Int -> STM Bool
@@ -304,11 +294,3 @@ wantBytes ros known bytes = do
 -- | Whether a goal of ours may still run on this action.
 mayRun :: Ros -> Text -> STM Bool
 mayRun ros action = any ((== action) . sentTo) <$> readTVar (sent ros)
-
--- | Ends the goal, unless it has ended.
-endWith :: Sent -> End -> STM ()
-endWith = setOnce . end
-
--- | Of several values only the first counts.
-setOnce :: TVar (Maybe a) -> a -> STM ()
-setOnce known what = readTVar known >>= \before -> when (isNothing before) (writeTVar known (Just what))

@@ -26,6 +26,7 @@ import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message (decoded)
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Sent
 import Behavior.Ros.Internal.Status
 
 -- | Takes what came from the bridge at this time, in a frame of this size.
@@ -72,12 +73,14 @@ takeAnswer ros time answer = case answer of
   goal n = Map.lookup n <$> readTVar (sent ros)
   call n = Map.lookup n <$> readTVar (calls ros)
   forget n = modifyTVar' (sent ros) (Map.delete n)
-  -- Goals that were sent in this connection may not have reached their server yet.
+  -- (Goals that were sent in this connection may not have come to their server yet.)
   takeStatus action value = case decoded value of
     Left why -> refuse ros why
-    Right (Statuses goals) -> when (all (hasEnded . snd) goals) $ do
-      current <- connections <$> readTVar (link ros)
-      modifyTVar' (sent ros) (Map.filter (\known -> sentTo known /= action || sentIn known == current))
+    Right (Statuses goals) -> do
+      l <- readTVar (link ros)
+      ours <- Map.filter (\known -> sentTo known == action && sentIn known < connections l) <$> readTVar (sent ros)
+      for_ ours (\known -> writeTVar (isAbsent known) (all (hasEnded . snd) goals))
+      when (isSettled l) (settle ros)
 
 -- | Counts a frame that was refused, and reports why.
 refuse :: Ros -> String -> STM ()

@@ -1,0 +1,53 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
+-- |
+-- A goal that was sent, and how it ended.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Ros.Internal.Sent
+  ( Sent (..)
+  , newSent
+  , End (..)
+  , endWith
+  , setOnce
+  ) where
+
+import Control.Concurrent.STM
+import Control.Monad (when)
+import Data.Aeson (Value)
+import Data.Maybe (isNothing)
+import Data.Text (Text)
+
+-- | A goal that was sent.
+data Sent = Sent
+  { sentTo :: Text
+  -- ^ The action.
+  , sentIn :: !Int
+  -- ^ The number of the connection.
+  , feedback :: TVar (Maybe Value)
+  , end :: TVar (Maybe End)
+  , cancelled :: TVar Bool
+  -- ^ Whether we have asked the robot to cancel it.
+  , isAbsent :: TVar Bool
+  -- ^ Whether its server has said, over a later connection, that none of its goals runs. (It may not have accepted
+  -- this one yet.)
+  }
+
+-- | To this action, over that connection, with a place for its feedback.
+newSent :: Text -> Int -> TVar (Maybe Value) -> STM Sent
+newSent action connection latest =
+  Sent action connection latest <$> newTVar Nothing <*> newTVar False <*> newTVar False
+
+-- | How a goal ended, as far as we know.
+data End
+  = Ended !Int Value
+  | Complained Text
+  | Lost
+
+-- | Ends the goal, unless it has ended.
+endWith :: Sent -> End -> STM ()
+endWith = setOnce . end
+
+-- | Of several values only the first counts.
+setOnce :: TVar (Maybe a) -> a -> STM ()
+setOnce known what = readTVar known >>= \before -> when (isNothing before) (writeTVar known (Just what))
