@@ -41,7 +41,7 @@ complaints :: World -> Report -> [String]
 complaints world report =
   concat
     [ [show n ++ " is sent twice" | n : more <- tails sent', n `elem` more]
-    , [show (n, m) ++ " run at once" | (n, m) <- atOnce goals, not (allowed (leafOf n) (leafOf m))]
+    , [show (n, m) ++ " run at once" | (n, m) <- atOnce goals, not (allowed (leafOf (min n m)) (leafOf (max n m)))]
     , concatMap (wrongIn world report goals) (leaves report)
     , [show n ++ " is left running" | g <- leftRunning report, n <- ofNumber g, not (any mayStillRun (leafOf n))]
     , ["it is not known that all goals have ended: " ++ show (unsettled report) | unsettled report > length unheard]
@@ -54,6 +54,7 @@ complaints world report =
   -- (A server that never accepted a goal has never said anything about its goals.)
   unheard = [l | l <- leaves report, mayStillRun l, actionOf l `notElem` heard]
   heard = [actionOf l | (n, g) <- Map.toList goals, fmap snd (endedAt g) /= Just 0, Just l <- [leafOf n]]
+  -- (A serial bridge may pass on a later goal before an earlier one.)
   -- What may still run is known to, and a new goal on that action is refused (unless it replaces that).
   allowed (Just one) (Just two) = mayStillRun one && (actionOf one /= actionOf two || isReplacing (actionOf two))
   allowed _ _ = False
