@@ -137,21 +137,21 @@ spec = guarded $ do
         >>= (`shouldBe` "publishing: /speed is published already, as std_msgs/msg/Float64")
 
   describe "Stopping all goals" $ do
-    it "returns when the robot says that they have ended" . mission (const slowly) $ \robot ros -> do
+    it "returns when the robot says they have ended" . underSchedules 40 . mission (const slowly) $ \robot ros -> do
       let others = try (carrying ros "cup")
           stopping = sleep 1 >> inSeconds 0.5 (stopAll ros carry) >> atomically (runningGoals robot)
       both
         (others >>= (`shouldBe` Left (CancelledByOther "/carry")))
         (stopping >>= (`shouldBe` []))
-    it "is a fault if the robot does not say that in time" . mission (const deaf) $ \robot ros -> do
+    it "is a fault if the robot does not say that in time" . underSchedules 40 . mission (const deaf) $ \robot ros -> do
       let runs = atomically (runningGoals robot >>= check . (== [1]))
           moving = firstOf [void (carrying ros "cup"), runs >> sleep 1]
       void (tried moving)
       tried (inSeconds 2 (stopAll ros carry)) >>= (`shouldBe` Left unconfirmed)
-    it "of a server that is not there fails" . mission (const slowly) $ \_ ros ->
+    it "of a server that is not there fails" . underSchedules 40 . mission (const slowly) $ \_ ros ->
       try (stopAll ros (untyped "/fly" ""))
         >>= (`shouldBe` Left (ServiceFailed "/fly/_action/cancel_goal" "there is no such service"))
-    it "when none runs returns" . mission (const slowly) $ \_ ros -> inSeconds 0 (stopAll ros carry)
+    it "when none runs returns" . underSchedules 40 . mission (const slowly) $ \_ ros -> inSeconds 0 (stopAll ros carry)
 
   describe "A namespace" $
     it "is that of relative names, and nests" . withRobot $ \robot ros -> do

@@ -4,6 +4,7 @@
 -- A link that is encrypted (wss).
 module Ros.TlsSpec (spec) where
 
+import Control.Concurrent (rtsSupportsBoundThreads)
 import Control.Exception (try)
 import Data.Aeson (Value)
 import qualified Data.ByteString as Strict
@@ -27,7 +28,16 @@ import Support (guarded)
 import Temporary (withPath)
 
 spec :: Spec
-spec = guarded . beforeAll (withOpenSSL (generateRSAKey' 2048 65537)) $ do
+spec =
+  guarded $
+    if rtsSupportsBoundThreads
+      then encrypted
+      else it "needs -threaded" $
+        withRos (rosbridge "wss://localhost:9090") (\_ -> pure ())
+          `shouldThrow` errorCall "rosbridge: wss needs a program that is linked with -threaded"
+
+encrypted :: Spec
+encrypted = beforeAll (withOpenSSL (generateRSAKey' 2048 65537)) $ do
   it "gives the result of a goal, if the bridge's certificate is trusted and names its host" $ \key ->
     withCertificate key "localhost" $ \file ->
       over (tlsServer key file) (trusting file) patient $ \ros -> carrying ros "cup" >>= (`shouldBe` "a cup")

@@ -11,6 +11,7 @@ module Behavior.Ros.Internal.Websocket
   ) where
 
 import Control.Applicative ((<|>))
+import Control.Concurrent (rtsSupportsBoundThreads)
 import Control.Monad (guard)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Char (isDigit)
@@ -35,7 +36,7 @@ import Behavior.Ros.Internal.Transport
 -- With @wss@ the bridge has to prove, by a certificate that this system trusts, that it is the host. (Give a name: an
 -- address of numbers, too, is looked for among the names in the certificate.) Otherwise the link does not come up, and
 -- what uses it fails with 'Behavior.Ros.NoServer', which says why. The robot does not check who you are: that is for
--- the network, or for a proxy before the bridge.
+-- the network, or for a proxy before the bridge. (The program has to be linked with @-threaded@.)
 --
 -- @since 0.1.0.0
 rosbridge :: String -> Transport
@@ -71,7 +72,7 @@ toBridge trusted refused url = case parts url of
   Just (isEncrypted, host, port, path) ->
     Transport
       { address = url
-      , refusal = ("rosbridge: " ++) <$> if isEncrypted then Nothing else refused host
+      , refusal = ("rosbridge: " ++) <$> if isEncrypted then needsThreads else refused host
       , connecting = \bytes received use -> do
           let options = limited bytes received
               client connection =
@@ -87,6 +88,7 @@ toBridge trusted refused url = case parts url of
             else Websockets.runClientWith host port path options [] client
       }
  where
+  needsThreads = if rtsSupportsBoundThreads then Nothing else Just "wss needs a program that is linked with -threaded"
   -- A larger frame is refused by the link, which goes on; one that is larger than this ends the connection, before it
   -- is all in memory.
   limited bytes received =
