@@ -6,7 +6,6 @@ module Ros.TlsSpec (spec) where
 
 import Control.Concurrent (rtsSupportsBoundThreads)
 import Control.Exception (try)
-import Data.Aeson (Value)
 import qualified Data.ByteString as Strict
 import Data.Foldable (traverse_)
 import Data.Time (addUTCTime, getCurrentTime)
@@ -17,7 +16,7 @@ import OpenSSL.PEM (writeX509)
 import OpenSSL.RSA (RSAKeyPair, generateRSAKey')
 import qualified OpenSSL.Session as Tls
 import OpenSSL.X509
-import Test.Hspec
+import Test.Hspec hiding (context)
 
 import Behavior
 import Behavior.Ros

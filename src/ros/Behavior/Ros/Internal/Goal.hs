@@ -36,7 +36,7 @@ import Behavior (Behavior, (?))
 import Behavior.Parallel (firstOf)
 import Behavior.Ros.Internal.Error
 import Behavior.Ros.Internal.Frame (Request (..))
-import Behavior.Ros.Internal.Link hiding (feedback)
+import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
 import Behavior.Ros.Internal.Options
 import Behavior.Ros.Internal.Sent

@@ -11,7 +11,7 @@ module Behavior.Ros.Internal.Tls
 import Control.Exception (SomeException, bracket, bracketOnError, throwIO, try)
 import Control.Monad (void)
 import qualified Data.ByteString as Strict
-import Network.Socket
+import Network.Socket hiding (socket)
 import Network.WebSockets.Stream (Stream, makeStream)
 import OpenSSL (withOpenSSL)
 import qualified OpenSSL.Session as Tls
