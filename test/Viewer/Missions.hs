@@ -16,6 +16,7 @@ module Viewer.Missions
   , robots
   , waited
   , beside
+  , untilButton
   , wateredAgain
 
     -- * Other events
@@ -178,6 +179,15 @@ beside t =
   ended 1 Top "mission" 0 Nothing 10 Succeeded
     ++ ended 2 (Inside 1) "look" 0 Nothing t Succeeded
     ++ ended 3 (Inside 1) "listen" 0 Nothing 5 (StoppedBy (SiblingFinished "left"))
+
+-- | A patrol beside a wait for the red button, for which the trace has these reactions; the patrol takes that many
+-- seconds to stop.
+untilButton :: Seconds -> [Reaction] -> [Event]
+untilButton took waits =
+  ended 1 Top "mission" 0 Nothing (20 + took) Succeeded
+    ++ ended 2 (Inside 1) "patrol" 0 Nothing (20 + took) (StoppedBy (SiblingFinished "left"))
+    ++ ended 9 (Inside 2) "gate" 18 Nothing (20 + took) (StoppedBy (SiblingFinished "left"))
+    ++ map Reacted waits
 
 -- | Beds are watered; after an interruption, from the first one on.
 wateredAgain :: [Event]

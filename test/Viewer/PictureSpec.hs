@@ -232,6 +232,22 @@ spec = do
       texts (drawn (beside 5)) `shouldSatisfy` elem "listenstopped: \"look\" finished"
     it "not one that ended earlier" $
       texts (drawn (beside 4)) `shouldSatisfy` elem "listenstopped: the left branch finished"
+    it "or the signal that was awaited beside it" $ do
+      let button n = Reaction n (Inside 1) "waitUntil" 20 [Change "red button" (Just "False") "True"] Nothing Nothing
+          pressed = [button 3]
+          doubtful =
+            [ untilButton 1 pressed
+            , untilButton 0 []
+            , untilButton 0 [button 3, button 4]
+            , untilButton 0 [(button 3) {reactionOperator = "switch"}]
+            , untilButton 0 [(button 3) {reactionParent = Inside 2}]
+            , untilButton 0 [(button 3) {reactionChanges = []}]
+            , untilButton 0 pressed ++ ended 5 (Inside 1) "look" 0 Nothing 20 Succeeded
+            ]
+      title (untilButton 0 pressed) `shouldBe` "mission was ended by red button True after 20 s:interrupted once"
+      texts (drawn (untilButton 0 pressed)) `shouldSatisfy` elem "red button True\8594 stopped \"patrol\" after 20 s"
+      -- Not if it is not known that this ended it.
+      map (take 17 . title) doubtful `shouldBe` map (const "mission succeeded") doubtful
 
   describe "has another mark for what succeeded in vain" $ do
     let marked events =

@@ -1,5 +1,6 @@
 module Viewer.TreeSpec (spec) where
 
+import Data.Foldable (for_)
 import Data.List (isInfixOf)
 import Data.Maybe (isNothing)
 import Test.Hspec
@@ -11,7 +12,7 @@ import Behavior.Trace.Tree
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
-import Viewer.Missions (beside)
+import Viewer.Missions (beside, untilButton)
 
 spec :: Spec
 spec = do
@@ -23,6 +24,12 @@ spec = do
         === 1 + length (nodes r) + length (recordingReactions r) + (if recordingLost r == 0 then 0 else 1)
   it "names the part that finished, so that others were stopped" $
     renderTree (recording (beside 5)) `shouldSatisfy` ("listen: stopped: \"look\" finished" `isInfixOf`)
+  it "names the signal that was awaited beside what was stopped" $ do
+    let change = [Change "red button" (Just "False") "True"]
+        shown = renderTree (recording (untilButton 0 [Reaction 3 (Inside 1) "waitUntil" 20 change Nothing Nothing]))
+    for_ ["patrol", "gate"] $ \name ->
+      shown `shouldSatisfy` ((name ++ ": stopped: red button True (was False)") `isInfixOf`)
+    shown `shouldSatisfy` ("! red button True (was False) -> stopped \"patrol\" after 20 s" `isInfixOf`)
   it "reports lost events also when it has nothing else" $
     renderTree (recording [Lost 2]) `shouldSatisfy` ("2 events were lost" `isInfixOf`)
   it "is that of the events in any order" . property $ \(Related events) ->
