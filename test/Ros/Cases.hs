@@ -22,6 +22,7 @@ import Behavior.Ros.Action
 import Behavior.Ros.Fake
 import Behavior.STM
 import qualified Behavior.Signal as Signal
+import Ros.Stage (patient)
 
 -- | A link to the robot, and what cuts it and mends it.
 data Host = Host
@@ -161,16 +162,17 @@ fibonacci name = untyped name "test_msgs/action/Fibonacci"
 wanted :: Int -> Value
 wanted order = object ["order" .= order]
 
--- | (The real servers' goals take seconds; it is not waited longer than this for what never comes.)
+-- | What never comes is not waited for longer than this.
 impatient :: RosOptions
-impatient = defaultRosOptions {patience = 0.5, noServerAfter = 15, pongWithin = 15}
+impatient = patient {patience = 0.5}
 
--- | The servers of the fake robot.
+-- | The servers of the fake robot. (Of "/stubborn" and "/steady" goals must still run when the mission looks: on a
+-- busy machine that is late.)
 servers :: [(String, Value -> GoalScript)]
 servers =
   [ ("/fast", lasting 3600)
-  , ("/stubborn", \v -> (lasting 1 v) {confirmsAfter = 1 / 0})
-  , ("/steady", lasting 1)
+  , ("/stubborn", \v -> (lasting 3 v) {confirmsAfter = 1 / 0})
+  , ("/steady", lasting 3)
   , ("/brief", lasting 0.01)
   , ("/picky", picky)
   ]
