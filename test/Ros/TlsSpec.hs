@@ -19,8 +19,11 @@ import OpenSSL.X509
 import Test.Hspec hiding (context)
 
 import Behavior
+import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
+import Behavior.STM
+import qualified Behavior.Signal as Signal
 import Ros.Bridge
 import Ros.Stage
 import Support (guarded)
@@ -39,7 +42,7 @@ encrypted :: Spec
 encrypted = beforeAll (withOpenSSL (generateRSAKey' 2048 65537)) $ do
   it "gives the result of a goal, if the bridge's certificate is trusted and names its host" $ \key ->
     withCertificate key "localhost" $ \file ->
-      over (tlsServer key file) (trusting file) patient $ \ros -> carrying ros "cup" >>= (`shouldBe` "a cup")
+      over (tlsServer key file) (trusting file) patient $ \_ ros -> carrying ros "cup" >>= (`shouldBe` "a cup")
   it "does not come up with a certificate that the system does not trust" $ \key ->
     withCertificate key "localhost" $ \file ->
       refusedBy (tlsServer key file) (\port -> rosbridge ("wss://localhost:" ++ port)) "certificate verify failed"
@@ -54,17 +57,23 @@ encrypted = beforeAll (withOpenSSL (generateRSAKey' 2048 65537)) $ do
  where
   trusting file port = rosbridgeTrusting file ("wss://localhost:" ++ port)
   refusedBy server way why =
-    over server way patient {noServerAfter = 1} $ \ros -> do
+    over server way patient {noServerAfter = 0.1} $ \robot ros -> do
+      let attempts = length <$> seen robot
+      -- (When the second attempt has begun, the first has failed.)
+      firstOf [atomically (attempts >>= check . (>= 2)), Signal.waitUntil (linkUp ros)]
       end <- try (carrying ros "cup")
       case end of
         Left (NoServer _ said) -> said `shouldContain` why
         other -> expectationFailure (show other)
+      -- (The bridge was reached, and has received nothing of the mission.)
+      came <- map snd <$> atomically (seen robot)
+      filter (/= Connected) came `shouldBe` []
 
 -- | A mission with that server, and that way to its port.
-over :: Server -> (String -> Transport) -> RosOptions -> (Ros -> Behavior a) -> Behavior a
+over :: Server -> (String -> Transport) -> RosOptions -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 over server way options act =
   withFakeRobot [("/carry", const succeeding {endsWith = Succeeds "a cup"})] $ \robot ->
-    withBridgeOver server robot (\port -> withRosWith options (way port) act)
+    withBridgeOver server robot (\port -> withRosWith options (way port) (act robot))
 
 -- | With that key, and the certificate in that file.
 tlsServer :: RSAKeyPair -> FilePath -> Server
