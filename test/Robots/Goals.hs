@@ -30,10 +30,7 @@ import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)
 import Robots.Stage
-
--- | The action of the servers.
-fibonacci :: String -> Action Value
-fibonacci name = untyped name "test_msgs/action/Fibonacci"
+import Ros.Stage (failureOrFault, fibonacci)
 
 -- | Sends a goal with that order.
 type Sending = Int -> Behavior Value
@@ -66,8 +63,7 @@ outcome :: Either SomeException a -> String
 outcome how = case how of
   Right _ -> "completed"
   Left why
-    | Just fault <- fromException why -> head (words (show (fault :: RosFault)))
-    | Just failure <- fromException why -> head (words (show (failure :: RosFailure)))
+    | Just name <- failureOrFault why -> name
     | isJust (fromException why :: Maybe SomeAsyncException) -> "stopped"
     | otherwise -> "other"
 

@@ -9,11 +9,12 @@ module Robots.Lies
   , floods
   ) where
 
-import Control.Exception (SomeException, displayException, fromException)
+import Control.Exception (SomeException, displayException)
 import Control.Monad (forever, void, when)
 import Data.Aeson (Value, (.=))
 import Data.Foldable (for_)
 import Data.Int (Int32)
+import Data.Maybe (fromMaybe)
 import Data.Text (Text)
 import qualified Data.Text as Text
 
@@ -27,6 +28,7 @@ import qualified Behavior.Signal as Signal
 import Behavior.Time (every, timeout)
 import Robots.Goals
 import Robots.Stage
+import Ros.Stage (failureOrFault)
 
 -- | While a goal runs, each frame is answered: by the line about it, or by what a signal says of the reading. (The
 -- lines that nothing has time for are left out, and counted.)
@@ -45,9 +47,8 @@ hostile stage = withLies stage ["hostile", "10000"] $ \way -> do
             refused <- Signal.read (refusedFrames ros)
             note stage 10 ["refused" .= refused]
             -- Now come frames as large as is allowed: a map.
-            let map' = topic "/map" latched :: Topic Value
             uninterrupted stage 10 [] (plainly ros (fibonacci "/fake"))
-              `both` void (Signal.read (latest ros (upToBytes 10000000 map')))
+              `both` void (Signal.read (latest ros (upToBytes 10000000 (topic "/map" latched) :: Topic Value)))
         , forever (atomically (readTBQueue reported) >>= say . Std . Text.pack)
         , forever (atomically (receive inbox) >> judging >>= say . Std . verdict)
         ]
@@ -56,7 +57,7 @@ hostile stage = withLies stage ["hostile", "10000"] $ \way -> do
 verdict :: Either SomeException Bool -> Text
 verdict = \case
   Right low -> Text.pack (show low)
-  Left why -> maybe "another fault" (Text.pack . head . words . show) (fromException why :: Maybe RosFault)
+  Left why -> Text.pack (fromMaybe "another fault" (failureOrFault why))
 
 -- | Messages faster than one reader takes them, while there is a reaction to others; then those which a real bridge
 -- carries.
@@ -69,7 +70,7 @@ floods stage = do
     publishing ros (publication "/said") $ \say ->
       withMessages ros (numbers "/flood") 1000 $ \fast -> withMessages ros (numbers "/flood") 100 $ \slow -> do
         let reacting n = do
-              next <- Signal.waitUntilJust ((\m -> if m == n then Nothing else Just m) <$> newest "/pulse")
+              next <- otherThan n (newest "/pulse")
               say (Std (Text.pack (show next)))
               reacting next
         quickly <- newTaken

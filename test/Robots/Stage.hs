@@ -25,6 +25,7 @@ module Robots.Stage
     -- * Numbers and limits
   , somewhere
   , within
+  , otherThan
   ) where
 
 import Control.Concurrent.MVar
@@ -139,3 +140,7 @@ somewhere low high = realToFrac <$> generate (choose (low, high))
 -- | Waits for what has to come, and does not wait forever.
 within :: Seconds -> String -> Signal.Signal Bool -> Behavior ()
 within seconds what condition = timeout seconds (Signal.waitUntil condition) ? failWith ("it did not come: " ++ what)
+
+-- | Waits for another value than that.
+otherThan :: Eq a => a -> Signal.Signal a -> Behavior a
+otherThan before = Signal.waitUntilJust . fmap (\a -> if a == before then Nothing else Just a)

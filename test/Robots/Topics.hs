@@ -17,7 +17,7 @@ import Behavior hiding (rSelect)
 import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Messages
-import Behavior.Signal (Signal, rSelect, read, waitUntil, waitUntilJust)
+import Behavior.Signal (Signal, rSelect, read, waitUntil)
 import Robots.Goals
 import Robots.Stage
 
@@ -30,7 +30,7 @@ silences stage = withBridge stage 9090 $ \_ bridge -> do
     withRos bridge $ \ros -> do
       let bursts = numbers ros "/bursts" (atLeastEvery 10)
           arrivals n = do
-            next <- waitUntilJust ((\m -> if m == n then Nothing else Just m) <$> bursts)
+            next <- otherThan n bursts
             arrived <- clock
             note stage 8 ["arrived" .= arrived, "number" .= next]
             arrivals next

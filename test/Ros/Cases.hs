@@ -11,9 +11,10 @@ module Ros.Cases
   , servers
   ) where
 
-import Control.Exception (SomeException, fromException)
+import Control.Exception (SomeException)
 import Control.Monad (void)
 import Data.Aeson (Value (..), object, (.=))
+import Data.Maybe (fromMaybe)
 
 import Behavior
 import Behavior.Parallel (firstOf)
@@ -22,7 +23,7 @@ import Behavior.Ros.Action
 import Behavior.Ros.Fake
 import Behavior.STM
 import qualified Behavior.Signal as Signal
-import Ros.Stage (patient)
+import Ros.Stage (failureOrFault, fibonacci, patient)
 
 -- | A link to the robot, and what cuts it and mends it.
 data Host = Host
@@ -141,10 +142,7 @@ ended act = either how sequenceIn <$> tryAny act
   sequenceIn value = head ([show [n] | n <- orders, value == object ["sequence" .= [n]]] ++ [show value])
 
 how :: SomeException -> String
-how e = case (fromException e, fromException e) of
-  (Just failure, _) -> head (words (show (failure :: RosFailure)))
-  (_, Just fault) -> head (words (show (fault :: RosFault)))
-  _ -> show e
+how e = fromMaybe (show e) (failureOrFault e)
 
 orders :: [Int]
 orders = [1000002 .. 1000015]
@@ -155,9 +153,6 @@ mayRun host = show <$> Signal.read (movingGoals (to host))
 
 untilNoneRuns :: Host -> Behavior String
 untilNoneRuns host = Signal.waitUntil ((== 0) <$> movingGoals (to host)) >> mayRun host
-
-fibonacci :: String -> Action Value
-fibonacci name = untyped name "test_msgs/action/Fibonacci"
 
 wanted :: Int -> Value
 wanted order = object ["order" .= order]

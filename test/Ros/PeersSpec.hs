@@ -105,11 +105,11 @@ counting period accepting = withServer $ \wanted ->
   in succeeding
       { acceptedAfter = fromMaybe 0.002 (lookup order accepting)
       , endsAfter = period * fromIntegral order
-      , endsWith = Succeeds (toRos (Sequence (take (fromIntegral order + 1) fibonacci)))
+      , endsWith = Succeeds (toRos (Sequence (take (fromIntegral order + 1) numbers)))
       , confirmsAfter = period
       }
  where
-  fibonacci = 0 : scanl (+) 1 fibonacci
+  numbers = 0 : scanl (+) 1 numbers
 
 -- | A robot with that server.
 withServer :: (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a

@@ -11,12 +11,14 @@ module Ros.Stage
   , slowly
   , stopAfter
   , noLink
+  , fibonacci
+  , failureOrFault
   , patient
   , named
   , inSeconds
   ) where
 
-import Control.Exception (throwIO)
+import Control.Exception (SomeException, fromException, throwIO)
 import Control.Monad (void)
 import Data.Aeson (Value (..))
 import Data.Text (Text)
@@ -60,6 +62,17 @@ slowly = succeeding {endsAfter = 60, confirmsAfter = 0.5}
 -- | The failure of what has no link to the fake robot in time.
 noLink :: RosFailure
 noLink = NoServer "the fake robot" "user error (connection refused)"
+
+-- | The real servers' action. (Its type comes with ROS.)
+fibonacci :: String -> Action Value
+fibonacci name = untyped name "test_msgs/action/Fibonacci"
+
+-- | The name of the failure or the fault, if it is one of robots.
+failureOrFault :: SomeException -> Maybe String
+failureOrFault e = case (fromException e, fromException e) of
+  (Just failure, _) -> Just (head (words (show (failure :: RosFailure))))
+  (_, Just fault) -> Just (head (words (show (fault :: RosFault))))
+  _ -> Nothing
 
 -- | On a machine that is very busy, an answer may take seconds.
 patient :: RosOptions
