@@ -12,6 +12,7 @@ module Ros.Mission
   , Happening (..)
   , Level (..)
   , worlds
+  , seconds
   , planOf
   , isReplacing
 
@@ -313,5 +314,6 @@ scriptOf plan wanted =
 pause :: Int -> Behavior ()
 pause = sleep . seconds
 
+-- | A number of hundredths.
 seconds :: Int -> Seconds
 seconds n = fromIntegral n / 100

@@ -21,8 +21,9 @@ import Ros.Mission
 import qualified Support
 
 -- | Structured: a goal that was stopped, or whose result came, has ended on the robot; never both: no two goals run at
--- once. For both, what may still run ('mayStillRun') is known to, and is waited for before the next goal on its action.
--- Completed results are kept: each goal ends when it ends on the robot, and as it ended there.
+-- once. But for those that end with one of two faults ('mayStillRun'): these are counted, and the next goal on their
+-- action is refused meanwhile. Completed results are kept: each goal ends when it ends on the robot, and as it ended
+-- there.
 keptByMissions :: Promise
 keptByMissions =
   Promise
@@ -40,22 +41,22 @@ keptByMissions =
 complaints :: World -> Report -> [String]
 complaints world report =
   concat
-    [ [show n ++ " is sent twice" | n : more <- tails sent', n `elem` more]
-    , [show (n, m) ++ " run at once" | (n, m) <- atOnce goals, not (allowed (leafOf (min n m)) (leafOf (max n m)))]
+    [ [show n ++ " is sent twice" | n : more <- tails numbers, n `elem` more]
+    , -- (In the order in which they were sent: a serial bridge may pass on the later one before the earlier one.)
+      [show (n, m) ++ " run at once" | (n, m) <- atOnce goals, not (allowed (leafOf (min n m)) (leafOf (max n m)))]
     , concatMap (wrongIn world report goals) (leaves report)
     , [show n ++ " is left running" | g <- leftRunning report, n <- ofNumber g, not (any mayStillRun (leafOf n))]
     , ["it is not known that all goals have ended: " ++ show (unsettled report) | unsettled report > length unheard]
     ]
  where
   goals = foldl recorded Map.empty (came report)
-  sent' = [truncate n | (_, GoalCame _ _ (Number n)) <- came report] :: [Int]
+  numbers = [truncate n | (_, GoalCame _ _ (Number n)) <- came report] :: [Int]
   leafOf n = Map.lookup n (Map.fromList [(order l, l) | l <- leaves report])
   ofNumber g = [n | (n, Recorded {number = k}) <- Map.toList goals, g == k]
   -- (A server that never accepted a goal has never said anything about its goals.)
   unheard = [l | l <- leaves report, mayStillRun l, actionOf l `notElem` heard]
   heard = [actionOf l | (n, g) <- Map.toList goals, fmap snd (endedAt g) /= Just 0, Just l <- [leafOf n]]
-  -- (A serial bridge may pass on a later goal before an earlier one.)
-  -- What may still run is known to, and a new goal on that action is refused (unless it replaces that).
+  -- Beside a goal that may still run: one on another action, or one that replaces it.
   allowed (Just one) (Just two) = mayStillRun one && (actionOf one /= actionOf two || isReplacing (actionOf two))
   allowed _ _ = False
 
@@ -122,7 +123,7 @@ wrongIn world report goals l =
     [ ("it did not end as it did on the robot", not (agrees (snd <$> endedAt g)))
     , ("it did not end when it did on the robot", not (mayStillRun l || fmap fst (endedAt g) `isAbout` over l))
     , ("it was not stopped when the level was not high", isGuarded l && any (missed g) falls)
-    , ("it came when its behaviour was over", not (serial world) && after' (over l) (cameAt g))
+    , ("it came when its behaviour was over", not (serial world) && over l `isBefore` cameAt g)
     , ("it was cancelled, and has completed", hasCompleted && not (null (cancelledAt g)))
     , ("it did not notice that the link was lost", any (outlives g) (happened report))
     , ("its stop would have been confirmed", isNotConfirmed && wouldConfirm g)
@@ -143,39 +144,36 @@ wrongIn world report goals l =
   -- Cancels come at once; one that comes after it was accepted, at most 0.2 s later.
   wouldConfirm g = case cancelledAt g of
     first : _ | not (serial world || any (isFrozen . (first +)) [0, patienceHere / 2, patienceHere]) ->
-      let accepted = cameAt g + hundredths (accepts plan)
-          byItself = accepted + hundredths (lasts plan)
-          confirmed = maybe (1 / 0) (\n -> max accepted first + 0.2 + hundredths n) (confirms plan)
+      let accepted = cameAt g + seconds (accepts plan)
+          byItself = accepted + seconds (lasts plan)
+          confirmed = maybe (1 / 0) (\n -> max accepted first + 0.2 + seconds n) (confirms plan)
       in min byItself confirmed < first + patienceHere - 0.001
     [] -> not (serial world || isFrozen (over l) || isFrozen (over l - patienceHere))
     _ -> False
   plan = planOf world (order l)
   outlives g (time, what) = case what of
-    Loses _ -> after' (cameAt g) time && after' time (over l)
-    Freezes _ -> after' (cameAt g) time && after' (time + lostAfter) (over l)
+    Loses _ -> cameAt g `isBefore` time && time `isBefore` over l
+    Freezes _ -> cameAt g `isBefore` time && (time + lostAfter) `isBefore` over l
     Charge _ -> False
-  missed g time = after' (begun l) time && after' time (over l) && not (any (<= time + 0.001) (cancelledAt g))
+  missed g time = begun l `isBefore` time && time `isBefore` over l && not (any (<= time + 0.001) (cancelledAt g))
   levels = [(time, level) | (time, Charge level) <- reverse (happened report)]
   falls = [time | (time, level) <- levels, level /= High, isWrong time, not (serial world)]
   -- Whether no level that counts at that time is high. (If it has just changed, the one before counts, too.)
-  isWrong time = not (isFrozen time) && notElem High (last' (filter (\(t, _) -> after' t time) levels) ++ atThe time)
-  last' known = [snd (last known) | not (null known)]
+  isWrong time = not (isFrozen time) && notElem High (lastBefore time ++ atThe time)
+  lastBefore time = take 1 (reverse [level | (t, level) <- levels, t `isBefore` time])
   atThe time = [level | (t, level) <- levels, Just t `isAbout` time]
   isFrozen time = or
-    [time >= t - 0.001 && time <= t + lostAfter + hundredths n + 0.001 | (t, Freezes n) <- happened report]
+    [time >= t - 0.001 && time <= t + lostAfter + seconds n + 0.001 | (t, Freezes n) <- happened report]
 
 -- | Whether a link can have been lost at that time because of that.
 lostAt :: Seconds -> (Seconds, Happening) -> Bool
 lostAt time (t, what) = case what of
   Loses _ -> Just t `isAbout` time
-  Freezes n -> time >= t && time <= t + lostAfter + hundredths n + 0.001
+  Freezes n -> time >= t && time <= t + lostAfter + seconds n + 0.001
   Charge _ -> False
 
 isAbout :: Maybe Seconds -> Seconds -> Bool
 isAbout one other = maybe False (\t -> abs (t - other) < 0.001) one
 
-after' :: Seconds -> Seconds -> Bool
-after' one other = one + 0.001 < other
-
-hundredths :: Int -> Seconds
-hundredths n = fromIntegral n / 100
+isBefore :: Seconds -> Seconds -> Bool
+isBefore one other = one + 0.001 < other
