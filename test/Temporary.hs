@@ -16,7 +16,7 @@ inFolder = bracket create removeDirectoryRecursive
  where
   create = do
     temporary <- getTemporaryDirectory
-    (folder, file) <- openTempFile temporary "behavior-trace"
+    (folder, file) <- openTempFile temporary "behavior-lang"
     hClose file
     removeFile folder
     createDirectory folder
