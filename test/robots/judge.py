@@ -312,7 +312,7 @@ def row_9():
     took = [e["took"] for e in lies if e["event"] == "reaction"]
     print(f"row 9: reactions to another topic: median {statistics.median(took) * 1000:.1f} ms, "
           f"longest {max(took) * 1000:.1f} ms")
-    claim(9, "reactions", len(took), "50 a second", len(took) >= 49 * end["took"])
+    claim(9, "reactions", len(took), "at least 49 a second", len(took) >= 49 * end["took"])
     at_most(9, "reactions: 99th percentile", percentile(took, 0.99), 0.05)
     claim(9, "connections", connections(lies), "1", connections(lies) == 1)
     for load in (e for e in believed[9] if "rate" in e):
