@@ -5,7 +5,7 @@
 module Ros.LinkSpec (spec) where
 
 import Control.Concurrent (rtsSupportsBoundThreads)
-import Control.Exception (ErrorCall (..), try)
+import Control.Exception (ErrorCall (..), finally, throwIO, try)
 import Control.Monad (forM_, replicateM_, void)
 import qualified Data.ByteString.Lazy as Bytes
 import qualified Data.ByteString.Lazy.Char8 as Chars
@@ -19,11 +19,13 @@ import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Frame
+import Behavior.Ros.Internal.Transport
+import Behavior.Ros.Messages (Std (..))
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (events, simulate)
 import Behavior.Time
-import Behavior.Trace (Cause (..), End (..), Event (..), Span (..))
+import Behavior.Trace (End (..), Event (..), Span (..))
 import Ros.Stage
 import Support (ending, guarded)
 import qualified Support
@@ -116,28 +118,70 @@ spec = guarded $ do
         Signal.waitUntil (linkUp ros)
         sleep 1
       [(spanBegan s, time, how) | Ended s time how <- events run, spanName s == "link: the fake robot"]
-        `shouldBe` [(0, 1, FaultedWith "user error (connection lost)"), (2.5, 3.5, StoppedBy (SiblingFinished "2"))]
+        `shouldBe` [(0, 1, FaultedWith "user error (connection lost)"), (2.5, 3.5, Succeeded)]
     it "of another robot is not concerned" . underSchedules 40 . withFakeRobot [] $ \one ->
       mission (const slowly) $ \_ ros ->
         (sleep 5 >> loseLink one) `both` withRos (fakeRos one) (\_ -> inSeconds 60 (void (carrying ros "cup")))
+
+  describe "A bridge that is slow to take what is sent" $ do
+    it "is given a cancel before what is published" . underSchedules 40 $ do
+      frames <- onSlowBridge 1 $ \ros count -> do
+        let floods = sleep 2 >> count
+        void (stopAfter 4 (carrying ros "cup")) `both` floods
+      takeWhile (not . has "cancel") frames `shouldSatisfy` ((< 6) . length)
+      filter (has "cancel") frames `shouldSatisfy` not . null
+    it "is not given a goal that is stopped while it waits to be sent" . underSchedules 40 $ do
+      frames <- onSlowBridge 1 $ \ros count -> do
+        count
+        inSeconds 3 (void (stopAfter 3 (carrying ros "cup")))
+        Signal.read (movingGoals ros) >>= (`shouldBe` 0)
+      filter (has "goal") frames `shouldBe` []
+    it "is given what waits before the link ends, however the mission ends" $
+      forM_ [pure (), void failed, sleepForever] $ \ends -> underSchedules 40 $ do
+        frames <- onSlowBridge 0.01 $ \_ count -> void (stopAfter 0.1 ends) `finally` count
+        length (filter (has "publish") frames) `shouldBe` 50
+    it "is not waited for longer than a second" . underSchedules 40 $ do
+      frames <- inSeconds 1 (onSlowBridge 0.1 (const id))
+      length (filter (has "publish") frames) `shouldSatisfy` (< 12)
 
   describe "An address" $ do
     forM_ [("ws://127.0.0.1:9090", True), ("ws://localhost:1/x", True), ("ws://[::1]:9090", True)] allowed
     forM_ [("ws://10.0.0.1:9", False), ("wss://10.0.0.1:9", rtsSupportsBoundThreads), ("ws://127.0.0.1", False)] allowed
     forM_ [("ws://127.evil.org:1", False), ("ws://127.0.0.1:70000", False), ("", False)] allowed
+    forM_ [("ws://127.0.0.1:18446744073709560706", False)] allowed
   describe "A duration" $
     it "is not negative" $
       withFakeRobot [] (\robot -> withRosWith defaultRosOptions {patience = -1} (fakeRos robot) (\_ -> pure ()))
         `shouldThrow` errorCall "withRosWith: a duration is zero or more seconds, not -1.0"
  where
+  has text frame = text `isInfixOf` Chars.unpack frame
   limits = Limits 1000 64
   throwFault = ioError (userError "full disk")
   isLost e = case e of
     LinkLost _ why -> "nothing was received" `isInfixOf` why
     _ -> False
-  allowed (address, is) = it (show address ++ " is " ++ (if is then "allowed" else "refused")) $ do
-    end <- try (withRos (rosbridge address) (\_ -> pure ()))
+  allowed (address', is) = it (show address' ++ " is " ++ (if is then "allowed" else "refused")) $ do
+    end <- try (withRos (rosbridge address') (\_ -> pure ()))
     either (\(ErrorCall _) -> False) (const True) end `shouldBe` is
+
+-- | The frames that are sent to a bridge which takes so long for each, and answers nothing; by a mission that is given
+-- what publishes fifty messages, and has a minute.
+onSlowBridge :: Seconds -> (Ros -> Behavior () -> Behavior ()) -> Behavior [Bytes.ByteString]
+onSlowBridge pause act = do
+  taken <- newIORef []
+  over <- newTVarIO False
+  let takes frame = modifyIORef' taken (frame :) >> sleep pause
+      closes = atomically (writeTVar over True)
+      way = Transport "slow" Nothing $ \_ received use -> use (Connection ended takes received closes)
+      ended = atomically (readTVar over >>= check) >> throwIO (userError "it was closed")
+      counts = publication "/count" :: Publication (Std (Maybe Double))
+  end <- try . timeout 60 . withRosWith defaultRosOptions {patience = 10, pingEvery = 1000} way $ \ros ->
+    publishing ros counts $ \say -> act ros (forM_ [1 .. 50] (say . Std . Just))
+  case end of
+    Left (NotConfirmed "/carry" _) -> pure ()
+    Left other -> throwIO other
+    Right () -> pure ()
+  reverse <$> readIORef taken
 
 -- | Frames that are none, and what is said about them.
 hostile :: [(Bytes.ByteString, String)]

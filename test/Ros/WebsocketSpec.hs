@@ -4,9 +4,13 @@
 -- The same over a real websocket: a server on this machine, behind which is a fake robot.
 module Ros.WebsocketSpec (spec) where
 
-import Control.Exception (try)
-import Control.Monad (void)
+import Control.Exception (bracket, try)
+import Control.Monad (forM_, forever, void)
 import Data.Aeson (Value, object, (.=))
+import qualified Data.ByteString.Char8 as Chars
+import Network.Socket (accept, close, socketPort)
+import Network.Socket.ByteString (sendAll)
+import qualified Network.WebSockets as Websockets
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -14,6 +18,7 @@ import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Link (received)
+import Behavior.Ros.Internal.Service
 import Behavior.Ros.Messages
 import Behavior.STM
 import qualified Behavior.Signal as Signal
@@ -55,6 +60,25 @@ spec = guarded $ do
       Signal.waitUntil (not <$> linkUp ros)
       restoreLink robot
       void (carrying ros "cup")
+  it "what is published last comes to the robot before the link ends" $
+    withFakeRobot [] $ \robot -> withBridge robot $ \address' ->
+      forM_ [1 .. 30] $ \n -> do
+        let speed = publication "/speed" :: Publication (Std (Maybe Double))
+        withRosWith patient (rosbridge address') (\ros -> publishing ros speed ($ Std (Just n)))
+        came <- map snd <$> atomically (seen robot)
+        came `shouldContain` [Published "/speed" (object ["data" .= n])]
+  it "an answer to the handshake that does not end is refused" $
+    bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
+      port <- socketPort listening
+      let endless = forever $ do
+            (socket, _) <- accept listening
+            tryAny (sendAll socket "HTTP/1.1 101 x\r\nx: " >> forever (sendAll socket (Chars.replicate 4096 'a')))
+              >> close socket
+          toPort = withRosWith defaultRosOptions {noServerAfter = 0.5} (rosbridge ("ws://127.0.0.1:" ++ show port))
+      end <- servedBy endless (try (toPort (`carrying` "cup")))
+      case end of
+        Left (NoServer _ why) -> why `shouldContain` "64 KiB"
+        other -> expectationFailure (show other)
   it "a link whose bridge answers pings stays" $
     onSocketWith patient {pingEvery = 0.01} quickly $ \robot ros -> do
       Signal.waitUntil (linkUp ros)

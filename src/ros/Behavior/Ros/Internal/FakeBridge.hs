@@ -61,6 +61,7 @@ fakeRos robot =
       { receiveFrame = atomically (unlessBroken it (unlessFrozen (readTQueue (toClient it))))
       , sendFrame = \frame -> now >>= \time -> atomically (unlessBroken it (unlessFrozen' (takeFrame it time frame)))
       , sendPing = atomically (unlessBroken it (readTVar (isFrozen robot))) >>= \frozen -> unless frozen received
+      , sendClose = atomically (unlessBroken it (unlessFrozen' (writeTVar (isBroken it) True)))
       }
   takeFrame it time frame = do
     later <- (&&) <$> readTVar (isSerial robot) <*> (not . Map.null <$> readTVar (goals robot))

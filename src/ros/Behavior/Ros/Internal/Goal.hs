@@ -26,7 +26,7 @@ module Behavior.Ros.Internal.Goal
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, mask, throwIO, try)
 import Control.Monad (unless, void, when)
-import Data.Aeson (Value (String))
+import Data.Aeson (Value (Null, String))
 import qualified Data.Map.Strict as Map
 import Data.Proxy (Proxy (..))
 import Data.Text (Text)
@@ -238,7 +238,7 @@ start ros which wanted latest = do
   modifyTVar' (sent ros) (Map.insert name running)
   pure (name, running)
 
--- | Cancels the goal, again and again, until it has ended or the patience has.
+-- | Cancels the goal, again and again, until it has ended or the patience has. One that was not sent yet is withdrawn.
 confirmation :: Ros -> Action a -> Text -> Sent -> Behavior (Maybe End)
 confirmation ros which n running = do
   begun <- now
@@ -254,9 +254,11 @@ confirmation ros which n running = do
       (Nothing, pause : later) -> timeout pause (atomically (awaitEnd running)) ? askEvery begun later
       _ -> maybe (atomically (awaitEnd running)) pure ended
   askToCancel = do
-    ask ros (CancelGoal n (nameOf which))
+    isOut <- readTVar (isSent running)
+    if isOut then ask ros (CancelGoal n (nameOf which)) else withdraw
     before <- readTVar (cancelled running)
     unless before (writeTVar (cancelled running) True)
+  withdraw = (running `endWith` Ended 5 Null) >> modifyTVar' (sent ros) (Map.delete n)
   askForStatus = void . keptOf ros (statusOf (nameOf which)) (messageType (Proxy :: Proxy Statuses))
 
 awaitEnd :: Sent -> STM End

@@ -11,9 +11,10 @@ module Behavior.Ros.Internal.Keeper
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), Exception, finally, throwIO)
-import Control.Monad (forever)
+import Control.Monad (forever, join, void)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (for_, traverse_)
+import qualified Data.Map.Strict as Map
 import Prelude hiding (take)
 
 import Behavior (Behavior, Seconds, sleep, tryAny, (?))
@@ -23,10 +24,11 @@ import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Options
 import Behavior.Ros.Internal.Receive
+import Behavior.Ros.Internal.Sent
 import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
 import Behavior.STM (atomically)
-import Behavior.Time (now, sleepForever, timeout)
+import Behavior.Time (cleanupWithin, now, sleepForever, timeout)
 import Behavior.Trace (named)
 
 -- $setup
@@ -49,6 +51,9 @@ import Behavior.Trace (named)
 -- [Cancellation] Requests the stop of the behaviour; the link is there until the behaviour has ended, cleanup
 --   included: so goals are cancelled, and confirmed.
 --
+-- However the behaviour ends, what it has published is sent before 'withRos' returns, if the bridge takes it within a
+-- second: so a cleanup can publish that the robot is to stand still.
+--
 -- >>> :{
 -- void . simulate . withFakeRobot [] $ \robot -> withRos (fakeRos robot) $ \ros ->
 --   Signal.waitUntil (linkUp ros) >> putStrLn "connected"
@@ -68,10 +73,20 @@ withRosWith options transport behavior = do
   for_ durations (duration "withRosWith" . ($ options))
   traverse_ (throwIO . ErrorCall) (refusal transport)
   ros <- newRos (address transport) options
-  servedBy (keeping ros transport) (firstOf [behavior ros, reporting ros])
+  servedBy (keeping ros transport) (firstOf [behavior ros, reporting ros] `finally` closing ros)
     `finally` atomically (goDown ros "its withRos has ended" >> modifyTVar' (link ros) (\l -> l {isClosed = True}))
  where
   durations = [noServerAfter, patience, tooSlowAfter, pingEvery, pongWithin, firstPause, longestPause]
+
+-- | Has sent what waits to be sent when it returns, if the link is up and the bridge takes it in time.
+closing :: Ros -> Behavior ()
+closing ros = do
+  atomically (modifyTVar' (link ros) (\l -> l {isClosing = True}))
+  void (cleanupWithin closeWithin (atomically (readTVar (link ros) >>= check . not . isUp)))
+
+-- | How long it may take to close the connection.
+closeWithin :: Seconds
+closeWithin = 1
 
 -- | Passes on the lines about what was refused.
 reporting :: Ros -> Behavior a
@@ -87,7 +102,8 @@ keeping ros transport = go (firstPause options)
     why <- connected ros transport
     atomically (goDown ros why)
     lasted <- subtract began <$> now
-    sleep pause
+    over <- isClosing <$> readTVarIO (link ros)
+    if over then sleepForever else sleep pause
     -- (A bridge that closes each connection at once is not asked ever more often.)
     go (if lasted > longestPause options then firstPause options else min (longestPause options) (2 * pause))
 
@@ -102,7 +118,7 @@ connected ros transport = do
         -- (A trace shows when the link was there, and why no longer.)
         named ("link: " ++ robot ros) $
           firstOf (map whyItEnds [reading ros connection, writing ros connection first, pinging ros, settling ros])
-            >>= throwIO . LinkEnds
+            >>= \why -> readTVarIO (link ros) >>= \l -> if isClosing l then pure why else throwIO (LinkEnds why)
       connecting' = connecting transport (frameBytes (rosOptions ros)) (atomically (receivedAny ros)) use
       tooLong = do
         timeout connectWithin (atomically (readTVar up >>= check)) ? throwIO (LinkEnds "it takes too long to connect")
@@ -140,16 +156,21 @@ reading ros connection = forever $ do
     writeTVar (isReading ros) False
     either (refuse ros) (take ros time (fromIntegral (Bytes.length frame))) answer
 
--- | Writes these requests first. (A ping goes before all that wait.)
+-- | Writes these requests first. (A ping and a cancel go before all that wait; the end comes after them.)
 writing :: Ros -> Connection -> [Request] -> Behavior a
 writing ros connection first = do
   traverse_ write first
-  forever (atomically next >>= maybe (sendPing connection) write)
+  forever . join . atomically $ foldr1 orElse [ping, request cancels, request outgoing, close]
  where
   write = sendFrame connection . encodeRequest
-  next =
-    (Nothing <$ (readTVar (pingWanted ros) >>= check >> writeTVar (pingWanted ros) False))
-      `orElse` (Just <$> readTBQueue (outgoing ros))
+  request queue =
+    readTBQueue (queue ros) >>= \next -> case next of
+      -- (It may have been withdrawn.)
+      SendGoal n _ _ _ -> readTVar (sent ros) >>= maybe (pure (pure ())) (sendGoal next) . Map.lookup n
+      _ -> pure (write next)
+  sendGoal next known = write next <$ writeTVar (isSent known) True
+  ping = sendPing connection <$ (readTVar (pingWanted ros) >>= check >> writeTVar (pingWanted ros) False)
+  close = (sendClose connection >> sleepForever) <$ (readTVar (link ros) >>= check . isClosing)
 
 -- | Waits until the link is settled.
 settling :: Ros -> Behavior a

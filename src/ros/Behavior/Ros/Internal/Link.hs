@@ -41,7 +41,7 @@ module Behavior.Ros.Internal.Link
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Monad (unless, void, when)
+import Control.Monad (unless, when)
 import Data.Aeson (Value)
 import Data.Foldable (for_, traverse_)
 import Data.List (nub)
@@ -72,6 +72,8 @@ data Ros = Ros
   , link :: TVar Link
   , outgoing :: TBQueue Request
   -- ^ Empty while the link is down. (So the writer's thread alone writes, and no interruption tears a frame.)
+  , cancels :: TBQueue Request
+  -- ^ The same, for cancels: they go before everything else that waits.
   , pingWanted :: TVar Bool
   , received :: TVar Int
   -- ^ How often anything was received.
@@ -108,8 +110,9 @@ data Link = Link
   , whyLost :: String
   , whyDown :: String
   -- ^ Why it was lost, or why the latest attempt to connect has failed.
+  , isClosing :: !Bool
+  -- ^ Whether its behaviour has ended, and the connection is to be closed.
   , isClosed :: !Bool
-  -- ^ Whether its behaviour has ended.
   }
 
 -- | A topic.
@@ -146,8 +149,8 @@ data Reply
 newRos :: String -> RosOptions -> IO Ros
 newRos name options =
   Ros name options
-    <$> newTVarIO (Link False False 0 0 "" "it has not connected yet" False)
-    <*> newTBQueueIO 256
+    <$> newTVarIO (Link False False 0 0 "" "it has not connected yet" False False)
+    <*> newTBQueueIO 256 <*> newTBQueueIO 256
     <*> newTVarIO False <*> newTVarIO 0 <*> newTVarIO False
     <*> newTVarIO 1
     <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty
@@ -217,7 +220,7 @@ goDown ros why = do
   writeTVar (link ros) l {isUp = False, whyDown = why}
   when (isUp l) $ do
     modifyTVar' (link ros) (\down -> down {losses = losses down + 1, whyLost = why})
-    void (flushTBQueue (outgoing ros))
+    for_ [outgoing ros, cancels ros] flushTBQueue
     writeTVar (pingWanted ros) False
     writeTVar (isReading ros) False
     readTVar (kept ros) >>= traverse_ (\topic -> writeTVar (newest topic) Nothing)
@@ -266,7 +269,9 @@ handOver ros restore asking = do
 ask :: Ros -> Request -> STM ()
 ask ros request = do
   readTVar (link ros) >>= check . isUp
-  writeTBQueue (outgoing ros) request
+  (`writeTBQueue` request) $ case request of
+    CancelGoal _ _ -> cancels ros
+    _ -> outgoing ros
 
 -- | A number that no other goal, call or receiver has.
 newNumber :: Ros -> STM Int

@@ -18,7 +18,7 @@ import Data.Aeson (Value)
 import Data.Maybe (isNothing)
 import Data.Text (Text)
 
--- | A goal that was sent.
+-- | A goal that was sent, or waits to be sent.
 data Sent = Sent
   { sentTo :: Text
   -- ^ The action.
@@ -26,6 +26,8 @@ data Sent = Sent
   -- ^ The number of the connection.
   , feedback :: TVar (Maybe Value)
   , end :: TVar (Maybe End)
+  , isSent :: TVar Bool
+  -- ^ Whether it no longer waits to be sent.
   , cancelled :: TVar Bool
   -- ^ Whether we have asked the robot to cancel it.
   , isAbsent :: TVar Bool
@@ -36,7 +38,7 @@ data Sent = Sent
 -- | To this action, over that connection, with a place for its feedback.
 newSent :: Text -> Int -> TVar (Maybe Value) -> STM Sent
 newSent action connection latest =
-  Sent action connection latest <$> newTVar Nothing <*> newTVar False <*> newTVar False
+  Sent action connection latest <$> newTVar Nothing <*> newTVar False <*> newTVar False <*> newTVar False
 
 -- | How a goal ended, as far as we know.
 data End

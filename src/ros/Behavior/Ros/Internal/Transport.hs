@@ -33,4 +33,6 @@ data Connection = Connection
   { receiveFrame :: Behavior ByteString
   , sendFrame :: ByteString -> Behavior ()
   , sendPing :: Behavior ()
+  , sendClose :: Behavior ()
+  -- ^ Says that nothing more will be sent. Then 'receiveFrame' throws when the other end has received it all.
   }

@@ -12,14 +12,22 @@ module Behavior.Ros.Internal.Websocket
 
 import Control.Applicative ((<|>))
 import Control.Concurrent (rtsSupportsBoundThreads)
-import Control.Monad (guard)
+import Control.Monad (guard, when)
+import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Char (isDigit)
+import Data.Foldable (traverse_)
+import Data.IORef
 import Data.List (isPrefixOf, stripPrefix)
+import Network.Socket (Socket)
+import Network.Socket.ByteString (recv)
+import Network.Socket.ByteString.Lazy (sendAll)
 import Network.WebSockets (ConnectionOptions (..), SizeLimit (..), defaultConnectionOptions)
 import qualified Network.WebSockets as Websockets
+import Network.WebSockets.Stream (makeStream)
 import Text.Read (readMaybe)
 
+import Behavior.Ros.Internal.Socket
 import Behavior.Ros.Internal.Tls
 import Behavior.Ros.Internal.Transport
 
@@ -73,21 +81,22 @@ toBridge trusted refused url = case parts url of
     Transport
       { address = url
       , refusal = ("rosbridge: " ++) <$> if isEncrypted then needsThreads else refused host
-      , connecting = \bytes received use -> do
-          let options = limited bytes received
-              client connection =
-                use
-                  Connection
-                    { receiveFrame = Websockets.receiveData connection
-                    , sendFrame = Websockets.sendTextData connection
-                    , sendPing = Websockets.sendPing connection Bytes.empty
-                    }
-          if isEncrypted
-            then withTls trusted host port $ \stream ->
-              Websockets.runClientWithStream stream (host ++ ":" ++ show port) path options [] client
-            else Websockets.runClientWith host port path options [] client
+      , connecting = \bytes received use ->
+          withSocket host port . (if isEncrypted then withTls trusted host else plainly) $ \receive send -> do
+            open <- newIORef False
+            stream <- limitedUntil open receive >>= (`makeStream` send)
+            let options = limited bytes received
+            Websockets.runClientWithStream stream (authority host port) path options [] $ \connection ->
+              writeIORef open True >> use (over connection)
       }
  where
+  over connection =
+    Connection
+      { receiveFrame = Websockets.receiveData connection
+      , sendFrame = Websockets.sendTextData connection
+      , sendPing = Websockets.sendPing connection Bytes.empty
+      , sendClose = Websockets.sendClose connection Bytes.empty
+      }
   needsThreads = if rtsSupportsBoundThreads then Nothing else Just "wss needs a program that is linked with -threaded"
   -- A larger frame is refused by the link, which goes on; one that is larger than this ends the connection, before it
   -- is all in memory.
@@ -99,19 +108,39 @@ toBridge trusted refused url = case parts url of
         , connectionMessageDataSizeLimit = most
         }
 
+-- | Runs the action with what receives from the socket and sends to it.
+plainly :: (IO Strict.ByteString -> (Maybe Bytes.ByteString -> IO ()) -> IO a) -> Socket -> IO a
+plainly use socket = use (recv socket 32768) (traverse_ (sendAll socket))
+
+-- | Receives, to the end of the connection. Until it is open, a bridge has 64 KiB for what it says.
+limitedUntil :: IORef Bool -> IO Strict.ByteString -> IO (IO (Maybe Strict.ByteString))
+limitedUntil open receive = do
+  received <- newIORef 0
+  pure $ do
+    bytes <- receive
+    isOpen <- readIORef open
+    modifyIORef' received (+ Strict.length bytes)
+    n <- readIORef received
+    when (n > 65536 && not isOpen) . ioError $ userError "its answer to the handshake is longer than 64 KiB"
+    pure (if Strict.null bytes then Nothing else Just bytes)
+
+-- | Host and port, as an address has them.
+authority :: String -> Int -> String
+authority host port = (if ':' `elem` host then "[" ++ host ++ "]" else host) ++ ":" ++ show port
+
 -- | Whether an address is encrypted; its host, port and path.
 parts :: String -> Maybe (Bool, String, Int, String)
 parts url = do
   (isEncrypted, rest) <- ((,) False <$> stripPrefix "ws://" url) <|> ((,) True <$> stripPrefix "wss://" url)
-  let (authority, path) = break (== '/') rest
-  (host, port) <- case authority of
+  let (place, path) = break (== '/') rest
+  (host, port) <- case place of
     '[' : six -> case break (== ']') six of
       (h, ']' : ':' : p) -> Just (h, p)
       _ -> Nothing
-    _ -> case break (== ':') authority of
+    _ -> case break (== ':') place of
       (h, ':' : p) -> Just (h, p)
       _ -> Nothing
   guard (not (null host) && not (null port) && all isDigit port)
   number <- readMaybe port
-  guard (number <= 65535)
-  pure (isEncrypted, host, number, if null path then "/" else path)
+  guard (number <= (65535 :: Integer))
+  pure (isEncrypted, host, fromInteger number, if null path then "/" else path)
