@@ -316,7 +316,7 @@ def row_9():
     at_most(9, "reactions: 99th percentile", percentile(took, 0.99), 0.05)
     claim(9, "connections", connections(lies), "1", connections(lies) == 1)
     for load in (e for e in believed[9] if "rate" in e):
-        sent = [event for _, event in record[load["rate"]]]
+        sent = [event for _, event in record[f"/load/{load['rate']}"]]
         print(f"row 9: the real bridge: of {load['wanted']} messages, sent at {sent[-1] if sent else '?'} a second, "
               f"{load['arrived']} arrived; the link: {load['end']}")
 

@@ -47,7 +47,7 @@ def publish_load(rate):
             sent += 1
             loads.publish(Int32(data=sent))
         time.sleep(0.001)
-    record.write(f"{time.monotonic():.6f} /load {rate} {sent / (time.monotonic() - begun):.0f}\n".encode())
+    record.write(f"{time.monotonic():.6f} /load/{rate} 0 {sent / (time.monotonic() - begun):.0f}\n".encode())
 
 
 number = rate = 0
