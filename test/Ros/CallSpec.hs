@@ -19,8 +19,9 @@ import Behavior.Ros
 import Behavior.Ros.Action
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Frame (Answer (..))
-import Behavior.Ros.Internal.Link (Reply (..), Ros (calls), comeUp, goDown, newRos)
+import Behavior.Ros.Internal.Link (Reply (..), Ros (calls), newRos)
 import qualified Behavior.Ros.Internal.Receive as Receive
+import Behavior.Ros.Internal.UpDown (comeUp, goDown)
 import Behavior.Ros.Messages
 import Behavior.STM
 import qualified Behavior.Signal as Signal

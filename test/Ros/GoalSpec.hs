@@ -147,6 +147,15 @@ spec = guarded $ do
         try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
         Signal.waitUntil ((== 0) <$> movingGoals ros)
         atomically (runningGoals robot) >>= (`shouldBe` [])
+    it "the robot is asked again whether the old goal runs, if a new bridge has not said" . underSchedules 40 $
+      mission (const succeeding {endsAfter = 3}) $ \robot ros -> do
+        let losing = sleep 1 >> loseLink robot >> sleepForever
+        _ <- firstOf [losing, tried (carrying ros "cup") <* sleep 5]
+        -- (What is sent to the new bridge at once is lost.)
+        restoreLink robot >> freezeLink robot
+        Signal.waitUntil (linkUp ros)
+        sleep 0.1 >> restoreLink robot
+        timeout 10 (Signal.waitUntil ((== 0) <$> movingGoals ros))
     it "goals are not sent again, and new ones are refused while the old one runs" . underSchedules 80 $
       mission (const slowly) $ \robot ros -> do
         let losing = sleep 10 >> loseLink robot >> sleep 5 >> restoreLink robot >> sleepForever

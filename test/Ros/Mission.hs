@@ -128,7 +128,8 @@ ticks = elements [0, 1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 50]
 missions :: Gen Mission
 missions = sized $ \size ->
   let part = resize (size `div` 2) missions
-      small = frequency [(6, Goal <$> elements [False, False, True] <*> choose (0, 2)), (1, Pause <$> ticks)]
+      pauses = frequency [(3, ticks), (1, elements [120, 200])]
+      small = frequency [(6, Goal <$> elements [False, False, True] <*> choose (0, 2)), (1, Pause <$> pauses)]
   in if size <= 0
       then small
       else

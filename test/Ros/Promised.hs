@@ -100,7 +100,7 @@ wrongIn world report goals l =
   found = Map.lookup (order l) goals
   always =
     [ ("it has ended, and runs on", isRunning && not (mayStillRun l))
-    , ("it is not counted among those that may still run", isRunning && mayStillRun l && movingThen l == 0)
+    , ("more goals run when it is over than may still run, as far as is known", length (runningThen l) > movingThen l)
     , ("it begins while the level is not high", isGuarded l && isWrong (begun l))
     , ("it is refused, and none may still run", isRefused && not (any before (leaves report)))
     , ("no link was lost then", isLost && not (any (lostAt (over l)) (happened report)))

@@ -15,8 +15,9 @@ import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Frame (Answer (..))
-import Behavior.Ros.Internal.Link (comeUp, keptOf, newRos)
+import Behavior.Ros.Internal.Link (keptOf, newRos)
 import qualified Behavior.Ros.Internal.Receive as Receive
+import Behavior.Ros.Internal.UpDown (comeUp)
 import Behavior.Ros.Messages
 import Behavior.STM
 import Behavior.Signal (Signal)

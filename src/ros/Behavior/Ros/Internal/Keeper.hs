@@ -27,6 +27,7 @@ import Behavior.Ros.Internal.Receive
 import Behavior.Ros.Internal.Sent
 import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
+import Behavior.Ros.Internal.UpDown
 import Behavior.STM (atomically)
 import Behavior.Time (cleanupWithin, now, sleepForever, timeout)
 import Behavior.Trace (named)
@@ -172,9 +173,12 @@ writing ros connection first = do
   ping = sendPing connection <$ (readTVar (pingWanted ros) >>= check >> writeTVar (pingWanted ros) False)
   close = (sendClose connection >> sleepForever) <$ (readTVar (link ros) >>= check . isClosing)
 
--- | Waits until the link is settled.
+-- | Looks for goals of earlier connections until there are none.
 settling :: Ros -> Behavior a
-settling ros = sleep (patience (rosOptions ros)) >> atomically (settle ros) >> sleepForever
+settling ros = do
+  sleep (patience (rosOptions ros))
+  more <- atomically (settle ros)
+  if more then settling ros else sleepForever
 
 -- | Asks whether the bridge is there. Anything that comes is an answer. (While a frame is being read, answers wait
 -- behind it.)

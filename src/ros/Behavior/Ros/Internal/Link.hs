@@ -3,8 +3,8 @@
 {-# LANGUAGE RankNTypes #-}
 
 -- |
--- What is known of a link: whether it is up, what was sent over it, and what came. (The threads that use it are in
--- "Behavior.Ros.Internal.Keeper".)
+-- What is known of a link: whether it is up, what was sent over it, and what came. (How that changes when it comes up
+-- or goes down is in "Behavior.Ros.Internal.UpDown"; the threads that use it are in "Behavior.Ros.Internal.Keeper".)
 --
 -- Internal: any of it may change in any release.
 module Behavior.Ros.Internal.Link
@@ -16,10 +16,7 @@ module Behavior.Ros.Internal.Link
   , linkUp
   , refusedFrames
 
-    -- * Up and down
-  , comeUp
-  , goDown
-  , settle
+    -- * Asking the bridge
   , awaitLink
   , handOver
   , ask
@@ -43,21 +40,16 @@ module Behavior.Ros.Internal.Link
 import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (unless, when)
 import Data.Aeson (Value)
-import Data.Foldable (for_, traverse_)
-import Data.List (nub)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
-import Data.Proxy (Proxy (..))
 import Data.Text (Text)
 import qualified Data.Text as Text
 
 import Behavior (Behavior, Seconds, (?))
 import Behavior.Ros.Internal.Error
 import Behavior.Ros.Internal.Frame
-import Behavior.Ros.Internal.Message (messageType)
 import Behavior.Ros.Internal.Options
 import Behavior.Ros.Internal.Sent
-import Behavior.Ros.Internal.Status (Statuses, statusOf)
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal, named, watching)
 import Behavior.Time (timeout)
@@ -102,8 +94,6 @@ data Ros = Ros
 -- | Whether the link is up, and its past.
 data Link = Link
   { isUp :: !Bool
-  , isSettled :: !Bool
-  -- ^ Whether it has been up for the patience: what was sent over an earlier connection has come to its server.
   , connections :: !Int
   -- ^ How often it has come up.
   , losses :: !Int
@@ -149,7 +139,7 @@ data Reply
 newRos :: String -> RosOptions -> IO Ros
 newRos name options =
   Ros name options
-    <$> newTVarIO (Link False False 0 0 "" "it has not connected yet" False False)
+    <$> newTVarIO (Link False 0 0 "" "it has not connected yet" False False)
     <*> newTBQueueIO 256 <*> newTBQueueIO 256
     <*> newTVarIO False <*> newTVarIO 0 <*> newTVarIO False
     <*> newTVarIO 1
@@ -196,44 +186,6 @@ refusedFrames = named "refused frames" . watching . readTVar . refused
 -- @since 0.1.0.0
 movingGoals :: Ros -> Signal Int
 movingGoals ros = named "moving goals" (watching (Map.size <$> readTVar (sent ros)))
-
--- | The link is up: gives what is to be asked first. (Goals are never sent again.)
-comeUp :: Ros -> Seconds -> STM [Request]
-comeUp ros time = do
-  modifyTVar' (link ros) (\l -> l {isUp = True, isSettled = False, connections = connections l + 1})
-  topics <- readTVar (kept ros)
-  for_ topics (\topic -> writeTVar (askedAt topic) time)
-  topicsOfOurs <- readTVar (advertised ros)
-  before <- Map.elems <$> readTVar (sent ros)
-  for_ before (\known -> writeTVar (isAbsent known) False)
-  let moving = nub (map sentTo before)
-  pure $
-    [Advertise name type' keeps | (name, Advertised type' keeps _) <- Map.toList topicsOfOurs]
-      ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
-      ++ [Subscribe (statusOf action) (messageType (Proxy :: Proxy Statuses)) | action <- moving]
-
--- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is
--- never sent.
-goDown :: Ros -> String -> STM ()
-goDown ros why = do
-  l <- readTVar (link ros)
-  writeTVar (link ros) l {isUp = False, whyDown = why}
-  when (isUp l) $ do
-    modifyTVar' (link ros) (\down -> down {losses = losses down + 1, whyLost = why})
-    for_ [outgoing ros, cancels ros] flushTBQueue
-    writeTVar (pingWanted ros) False
-    writeTVar (isReading ros) False
-    readTVar (kept ros) >>= traverse_ (\topic -> writeTVar (newest topic) Nothing)
-    -- (They stay among those that may still run.)
-    readTVar (sent ros) >>= traverse_ (`endWith` Lost)
-    readTVar (calls ros) >>= traverse_ (`setOnce` NoReply)
-
--- | The link has been up for the patience. Goals of earlier connections that are absent have ended.
-settle :: Ros -> STM ()
-settle ros = do
-  modifyTVar' (link ros) (\l -> l {isSettled = True})
-  absent <- readTVar (sent ros) >>= traverse (readTVar . isAbsent)
-  modifyTVar' (sent ros) (`Map.difference` Map.filter id absent)
 
 -- | Throws if the link was lost more often than that, or is no longer used; and gives whether it is up.
 lostSince :: Ros -> Int -> STM Bool

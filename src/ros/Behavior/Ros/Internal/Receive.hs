@@ -77,10 +77,13 @@ takeAnswer ros time answer = case answer of
   takeStatus action value = case decoded value of
     Left why -> refuse ros why
     Right (Statuses goals) -> do
-      l <- readTVar (link ros)
-      ours <- Map.filter (\known -> sentTo known == action && sentIn known < connections l) <$> readTVar (sent ros)
-      for_ ours (\known -> writeTVar (isAbsent known) (all (hasEnded . snd) goals))
-      when (isSettled l) (settle ros)
+      connection <- connections <$> readTVar (link ros)
+      known <- readTVar (sent ros)
+      let ours = Map.filter (\one -> sentTo one == action && sentIn one < connection) known
+      for_ (Map.toList ours) $ \(n, one) -> do
+        by <- readTVar (arrivedBy one)
+        let none = all (hasEnded . snd) goals
+        if none && time >= by then forget n else writeTVar (isAbsent one) none
 
 -- | Counts a frame that was refused, and reports why.
 refuse :: Ros -> String -> STM ()

@@ -18,6 +18,8 @@ import Data.Aeson (Value)
 import Data.Maybe (isNothing)
 import Data.Text (Text)
 
+import Behavior (Seconds)
+
 -- | A goal that was sent, or waits to be sent.
 data Sent = Sent
   { sentTo :: Text
@@ -30,15 +32,17 @@ data Sent = Sent
   -- ^ Whether it no longer waits to be sent.
   , cancelled :: TVar Bool
   -- ^ Whether we have asked the robot to cancel it.
+  , arrivedBy :: TVar Seconds
+  -- ^ When it has come to its server, or never will: some time after the next connection has begun.
   , isAbsent :: TVar Bool
-  -- ^ Whether its server has said, over a later connection, that none of its goals runs. (It may not have accepted
-  -- this one yet.)
+  -- ^ Whether its server has said before that time, over a later connection, that none of its goals runs.
   }
 
 -- | To this action, over that connection, with a place for its feedback.
 newSent :: Text -> Int -> TVar (Maybe Value) -> STM Sent
 newSent action connection latest =
-  Sent action connection latest <$> newTVar Nothing <*> newTVar False <*> newTVar False <*> newTVar False
+  Sent action connection latest
+    <$> newTVar Nothing <*> newTVar False <*> newTVar False <*> newTVar (1 / 0) <*> newTVar False
 
 -- | How a goal ended, as far as we know.
 data End
