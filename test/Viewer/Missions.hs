@@ -186,6 +186,7 @@ untilButton :: Seconds -> [Reaction] -> [Event]
 untilButton took waits =
   ended 1 Top "mission" 0 Nothing (20 + took) Succeeded
     ++ ended 2 (Inside 1) "patrol" 0 Nothing (20 + took) (StoppedBy (SiblingFinished "left"))
+    ++ ended 8 (Inside 2) "whistle" 1 Nothing 2 (StoppedBy (SiblingFinished "left"))
     ++ ended 9 (Inside 2) "gate" 18 Nothing (20 + took) (StoppedBy (SiblingFinished "left"))
     ++ map Reacted waits
 

@@ -29,6 +29,7 @@ spec = do
         shown = renderTree (recording (untilButton 0 [Reaction 3 (Inside 1) "waitUntil" 20 change Nothing Nothing]))
     for_ ["patrol", "gate"] $ \name ->
       shown `shouldSatisfy` ((name ++ ": stopped: red button True (was False)") `isInfixOf`)
+    shown `shouldSatisfy` ("whistle: stopped: the left branch finished" `isInfixOf`)
     shown `shouldSatisfy` ("! red button True (was False) -> stopped \"patrol\" after 20 s" `isInfixOf`)
   it "reports lost events also when it has nothing else" $
     renderTree (recording [Lost 2]) `shouldSatisfy` ("2 events were lost" `isInfixOf`)

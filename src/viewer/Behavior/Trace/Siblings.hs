@@ -16,24 +16,27 @@ import Behavior.Trace.Recording
 -- | With the name of the span that finished or failed in place of the name of its branch. That is the last one that
 -- ended beside what was stopped, if it ended at the same time: at most a thousandth of the whole earlier. If none
 -- finished then, but one wait for a signal ended, and no other, that signal is the cause. Spans inside of what was
--- stopped have its cause.
+-- stopped have its cause, if they ended after that.
 withSiblings :: Recording -> Recording
 withSiblings r = r {recordingRoots = roots, recordingReactions = map stopping (recordingReactions r)}
  where
   roots = level Nothing (recordingRoots r)
-  -- The first argument: how the span around ended, in the trace and as it is shown.
+  -- The first argument: how the span around ended, in the trace and as it is shown, and when the cause of that was.
   level around ns = map one ns
    where
-    one n = n {nodeEnd = shown, nodeChildren = level ((,) <$> (snd <$> nodeEnd n) <*> (snd <$> shown)) (nodeChildren n)}
-     where
-      shown = (\(t, end) -> (t, ended n t end)) <$> nodeEnd n
-    ended n t end = case end of
+    one n = case nodeEnd n of
+      Just (t, end)
+        | Just (at, shown) <- causeOf n t end ->
+            n {nodeEnd = Just (t, StoppedBy shown), nodeChildren = level (Just (end, shown, at)) (nodeChildren n)}
+      _ -> n {nodeChildren = level Nothing (nodeChildren n)}
+    causeOf n t end = case end of
       StoppedBy (SiblingFinished _)
-        | Just (_, s) <- lastOf finished -> StoppedBy (SiblingFinished (spanName s))
-        | Just (at, x) <- lastOf waits, Nothing <- before at waits -> StoppedBy (causeOf x)
-      StoppedBy (SiblingFailed _) | Just (_, s) <- lastOf failed -> StoppedBy (SiblingFailed (spanName s))
-      _ | Just (same, instead) <- around, same == end -> instead
-      _ -> end
+        | Just ((at, _), s) <- lastOf finished -> Just (at, SiblingFinished (spanName s))
+        | Just (key@(at, _), x) <- lastOf waits, Nothing <- before key waits ->
+            Just (at, SignalChanged (reactionNumber x) (reactionChanges x))
+      StoppedBy (SiblingFailed _) | Just ((at, _), s) <- lastOf failed -> Just (at, SiblingFailed (spanName s))
+      _ | Just (same, shown, at) <- around, same == end, t >= at -> Just (at, shown)
+      _ -> Nothing
      where
       lastOf = inTime . Map.lookupLE (t, maxBound)
       before at = inTime . Map.lookupLT at
@@ -62,7 +65,6 @@ withSiblings r = r {recordingRoots = roots, recordingReactions = map stopping (r
       , not (null (reactionChanges x))
       ]
   isEndedWait x = reactionOperator x `elem` ["waitUntil", "waitUntilJust"]
-  causeOf x = SignalChanged (reactionNumber x) (reactionChanges x)
 
   -- With the outermost span that was stopped because the wait ended.
   stopping x = case IntMap.lookup (reactionNumber x) stopped of
