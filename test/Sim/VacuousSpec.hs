@@ -15,7 +15,7 @@ import Test.Hspec hiding (parallel)
 import Test.QuickCheck (Args (chatty), Result (output), quickCheckWithResult, stdArgs, (==>))
 
 import Behavior
-import Behavior.Message (onMessage, withInbox)
+import Behavior.Message (handleNext, messageRule, onMessage, withInbox)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
@@ -57,6 +57,14 @@ worlds = do
     (_, _, low) <- rover
     run <- Signal.withShared (signal low) (simulate . Signal.waitUntil)
     explain (outcome run) `shouldSatisfy` ("opened outside of this simulation" `isInfixOf`)
+  for_ handlers $ \(name, handling) ->
+    it ("cannot be followed in a simulation through an inbox that is opened outside: " ++ name) $ do
+      (world, _, _) <- rover
+      orders <- driver world "orders" [(1, "tea")]
+      run <- withInbox 9 orders (simulate . handling)
+      explain (outcome run) `shouldBe`
+        "it faulted: " ++ name ++ ": this inbox was opened in another run, so its driver does not deliver in this one; \
+        \open it inside of the simulation: simulate (withInbox ...)"
   it "is one that was not used at all, of which no claim is made" $ do
     (world, drive, _) <- rover
     void (simulate (pure () ? drive))
@@ -114,6 +122,13 @@ worlds = do
     wave >> runBehavior wave
     world `shouldRecord` exactly 2 (successOf "wave")
  where
+  handlers =
+    [ ("onMessage", \inbox -> onMessage inbox (\_ -> pure (pure ())) (sleep 60))
+    , ("handleNext", \inbox -> handleNext inbox (\_ -> pure (pure ())) ||| sleep 60)
+    , ("messageRule", \inbox -> do
+        rule <- messageRule inbox (\_ -> pure (pure ()))
+        Signal.teleoReactive [rule, (pure True, sleep 60)])
+    ]
   usesOutside =
     [ ("begin", \world _ -> begin world)
     , ("a note", \world _ -> note world "ready")

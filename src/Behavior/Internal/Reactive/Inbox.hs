@@ -21,7 +21,7 @@ module Behavior.Internal.Reactive.Inbox
 
 import Control.Concurrent.STM (STM, TVar, check, modifyTVar', newTVarIO, readTVar, retry, writeTVar)
 import Control.Exception (ErrorCall (..), bracket, finally, mask, onException, throwIO)
-import Control.Monad (forever, when)
+import Control.Monad (forever, unless, when)
 import Data.Foldable (for_, traverse_)
 import Data.List.NonEmpty (NonEmpty (..))
 import qualified Data.List.NonEmpty as NonEmpty
@@ -31,7 +31,7 @@ import qualified Data.Sequence as Seq
 import Behavior.Internal.Concurrent.Scope (branch, endedBy, outcome, structured)
 import Behavior.Internal.Core.Failure (Behavior)
 import Behavior.Internal.Reactive.Engine (Next (..), Response (..), react)
-import Behavior.Internal.Seam.Runtime (atomically)
+import Behavior.Internal.Seam.Runtime (atomically, simulatedRun)
 import Behavior.Internal.Signal.Source (Signal, named, watching)
 import qualified Behavior.Internal.Spans.Span as Span
 
@@ -56,6 +56,8 @@ data Inbox e = Inbox
   , nextNumber :: !(TVar Int)
   , droppedCount :: !(TVar Int)
   , isOpen :: !(TVar Bool)
+  , openedIn :: !(Maybe Int)
+  -- ^ The number of the simulation that it was opened in; 'Nothing' in reality.
   , called :: !(Maybe (String, e -> String))
   -- ^ For traces: its name, and the text of a message.
   }
@@ -75,7 +77,8 @@ data Message e = Message !Int e
 --
 -- [Result] The behaviour's.
 -- [Failure, fault] Of the behaviour, the subscription, or its end: thrown. A capacity of less than 1
---   is refused with an 'ErrorCall' (a fault).
+--   is refused with an 'ErrorCall' (a fault). So is handling a message in a simulation that runs inside of the
+--   behaviour.
 -- [Cancellation] Passes through. Whatever happens, the subscription is ended; what the driver
 --   delivers from then on is ignored. The subscription begins and ends as in
 --   'Control.Exception.bracket': masked.
@@ -96,6 +99,7 @@ withInbox size subscribe behavior = do
       <*> newTVarIO 0
       <*> newTVarIO 0
       <*> newTVarIO True
+      <*> thisRun
       <*> pure Nothing
   let close = atomically (writeTVar (isOpen inbox) False)
   bracket (subscribe (atomically . deliver inbox)) (close `finally`) (\_ -> behavior inbox)
@@ -155,9 +159,11 @@ namedInboxWith name render inbox = inbox {called = Just (name, render)}
 --
 -- @since 0.1.0.0
 onMessage :: Inbox e -> (e -> Behavior (STM ())) -> Behavior a -> Behavior a
-onMessage inbox handle task = react "onMessage" [False, True] someWait $ \case
-  True -> RunToEnd "handler" (BeginAgain <$ handleIfAny)
-  False -> Run "task" task
+onMessage inbox handle task = do
+  reachable "onMessage" inbox
+  react "onMessage" [False, True] someWait $ \case
+    True -> RunToEnd "handler" (BeginAgain <$ handleIfAny)
+    False -> Run "task" task
  where
   someWait = (> 0) <$> counting "waiting" inbox (queued inbox)
   -- (Something else may have taken it meanwhile.)
@@ -193,6 +199,7 @@ onMessage inbox handle task = react "onMessage" [False, True] someWait $ \case
 -- @since 0.1.0.0
 messageRule :: Inbox e -> (e -> Behavior (STM ())) -> Behavior (Signal Bool, Behavior a)
 messageRule inbox handle = do
+  reachable "messageRule" inbox
   here <- newTVarIO 0
   let ours = inbox {handling = here :| NonEmpty.toList (handling inbox)}
   pure ((> 0) <$> counting "unhandled" inbox (unhandled ours), forever (someWaits >> inBranch (handleNext ours handle)))
@@ -224,8 +231,22 @@ messageRule inbox handle = do
 --
 -- @since 0.1.0.0
 handleNext :: Inbox e -> (e -> Behavior (STM a)) -> Behavior a
-handleNext inbox handle = mask $ \restore ->
+handleNext inbox handle = mask $ \restore -> do
+  reachable "handleNext" inbox
   atomically (tryTake inbox >>= maybe retry pure) >>= handleTaken inbox (restore . handle)
+
+-- | Refuses an inbox that was opened in another run. (Around a simulation its driver delivers in real time: in virtual
+-- time nothing would come, and a test of that would pass.)
+reachable :: String -> Inbox e -> IO ()
+reachable operator inbox = do
+  here <- thisRun
+  unless (here == openedIn inbox) . throwIO . ErrorCall $
+    operator ++ ": this inbox was opened in another run, so its driver does not deliver in this one; open it inside of \
+    \the simulation: simulate (withInbox ...)"
+
+-- | The number of the simulation that the thread is part of.
+thisRun :: IO (Maybe Int)
+thisRun = fmap fst <$> simulatedRun
 
 -- | Handles a message that was taken. Call it masked: nothing may come between the taking and
 -- this, or between the handler's end and the commit.
