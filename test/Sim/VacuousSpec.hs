@@ -41,6 +41,16 @@ worlds = do
       explain (outcome run) `shouldSatisfy` ("started outside of the simulation" `isInfixOf`)
       -- The run is not judged here; but its record cannot be read either.
       (world `shouldRecord` never (startOf "drive")) `shouldThrow` saying "started outside of the simulation"
+  it "ends a simulation that may not use it, also if the behaviour catches that" $
+    for_ [void, both (pure ()) . void, (>> failed), (>> sleep 100)] $ \goesOn -> do
+      (world, drive, _) <- rover
+      begin world
+      run <- simulateWith defaultSimOptions {endAt = 50} (goesOn (tryAny drive))
+      explain (outcome run) `shouldSatisfy` ("started outside of the simulation" `isInfixOf`)
+  it "ends a simulation in which a claim does not hold, also if the behaviour catches that" $ do
+    (world, drive, _) <- rover
+    run <- simulate (tryAny (drive >> (world `shouldRecord` never (startOf "drive"))))
+    explain (outcome run) `shouldSatisfy` ("never \"drive\" begins" `isInfixOf`)
   it "cannot be used in another simulation" $ do
     (world, drive, _) <- rover
     void (simulate drive)

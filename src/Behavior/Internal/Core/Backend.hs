@@ -58,6 +58,8 @@ data Simulator = Simulator
   -- ^ Adds to the record that the calling thread starts.
   , recordNote :: String -> IO ()
   -- ^ Adds a text to the record.
+  , recordMistake :: SomeException -> IO ()
+  -- ^ Keeps what makes the run void, if it is the first: the run ends with it, also if the behaviour returns.
   , recordStartable :: String -> [String] -> IO ()
   -- ^ Adds what an operator with this name, which begins here, can start. (@""@: the scripted actions of a
   -- world.)

@@ -89,9 +89,9 @@ newMock =
 --
 -- > simulate (begin world >> mission)
 --
--- [Fault] If it is used in another run, that throws an 'ErrorCall', and so does reading its record later. In an
---   exploration its use outside of the simulation throws one, too. (Only the record may be read everywhere:
---   'happened', 'shouldRecord'.)
+-- [Fault] If it is used in another run, that throws an 'ErrorCall', and so does reading its record later; and a
+--   simulation ends with it, also if the behaviour catches it. In an exploration its use outside of the simulation
+--   throws one, too. (Only the record may be read everywhere: 'happened', 'shouldRecord'.)
 --
 -- >>> begin mock
 -- >>> run <- simulate (begin mock)
@@ -125,9 +125,12 @@ clock mock = do
     _ -> pure ()
   pure (maybe t startTime begun, t)
 
--- | Throws a mistake, which fails the property also if that catches it.
+-- | Throws a mistake, which fails the property and ends the run also if they catch it.
 mistake :: Maybe Property -> String -> IO a
-mistake property why = mapM_ (`keepMistake` ErrorCall why) property >> throwIO (ErrorCall why)
+mistake property why = do
+  keepInRun (ErrorCall why)
+  mapM_ (`keepMistake` ErrorCall why) property
+  throwIO (ErrorCall why)
 
 -- | The property of an exploration that uses this world.
 ownProperty :: Mock -> IO (Maybe Property)
@@ -254,7 +257,7 @@ shouldRecord mock claim = do
   for_ (either Just (const Nothing) (verdict claim record)) $ \why -> do
     -- Inside of a run this exception is only how a behaviour ends.
     run <- simulatedRun
-    when (isJust run) (mapM_ (`keepMistake` BrokenClaim why) property)
+    when (isJust run) (keepInRun (BrokenClaim why) >> mapM_ (`keepMistake` BrokenClaim why) property)
     throwIO (BrokenClaim why)
   for_ property (`keepPremises` premisesIn record claim)
 

@@ -36,6 +36,7 @@ module Behavior.Internal.Seam.Runtime
   , announce
   , announceStart
   , simulatedRun
+  , keepInRun
   , currentProperty
   ) where
 
@@ -175,6 +176,10 @@ sleepToSlot (Seconds every) (Seconds t) slot@(Seconds time)
 -- | Adds the text to the simulation's record.
 annotate :: String -> IO ()
 annotate text = inSimulation (pure ()) (`recordNote` text)
+
+-- | Keeps a mistake that makes a simulated run void: the run ends with it, also if the behaviour catches it.
+keepInRun :: Exception e => e -> IO ()
+keepInRun e = inSimulation (pure ()) (`recordMistake` toException e)
 
 -- | Passes an exception, which is not thrown, to GHC's handler for uncaught exceptions. In a
 -- simulation its text is added to the record instead.

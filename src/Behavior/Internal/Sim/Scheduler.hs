@@ -18,6 +18,7 @@ module Behavior.Internal.Sim.Scheduler
   , launch
   ) where
 
+import Control.Applicative ((<|>))
 import Control.Concurrent
 import Control.Concurrent.Async (Async, asyncOnWithUnmask, asyncThreadId)
 import Control.Concurrent.STM (STM, catchSTM, orElse, throwSTM)
@@ -70,6 +71,7 @@ simulation n property sim =
     , lookAtClock = readIORef (time sim)
     , recordStart = settle sim >> recordStep sim Starts
     , recordNote = \text -> settle sim >> recordStep sim (Note text)
+    , recordMistake = \e -> modifyIORef' (mistaken sim) (<|> Just e)
     , recordStartable = \operator branches -> reaching (canStart operator branches)
     , recordStarted = reaching . starts
     }

@@ -48,7 +48,8 @@ import Behavior.Internal.Spans.Place (Receiver (..), Trace, inPlace, newTrace, p
 -- > simulate  =  simulateWith defaultSimOptions
 --
 -- [Result] How the run ended ('Outcome'), even if the behaviour failed or faulted, or there was a
---   deadlock, a livelock, or a mistake that a simulation finds.
+--   deadlock, a livelock, or a mistake that a simulation finds. It throws ('Threw') what makes the run void also if
+--   the behaviour catches that: the use of a mock world of another run, and a claim that does not hold.
 -- [Fault] A simulation inside a simulation throws an 'ErrorCall'.
 -- [Cancellation] When the caller is cancelled, the run is ended, and then the cancellation is
 --   thrown.
@@ -115,6 +116,7 @@ simulateBy o property chooser act = do
     happened <- map (runIdentity . traverseTexts (Identity . settledText)) . reverse <$> readIORef (emitted sim)
     count <- readIORef (counter sim)
     started <- readIORef (reached sim)
+    mistake <- readIORef (mistaken sim)
     uninterruptibleMask_ (unwind sim verdict)
     end <- readIORef result
     deviating <- reverse <$> readIORef (deviations sim)
@@ -124,7 +126,7 @@ simulateBy o property chooser act = do
       Right v ->
         pure
           ( Run
-              { outcome = outcomeOf v end rest
+              { outcome = maybe (outcomeOf v end rest) Threw mistake
               , finished = endTime
               , steps = made
               , events = happened

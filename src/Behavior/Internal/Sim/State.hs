@@ -89,6 +89,8 @@ data Sim = Sim
   -- ^ The choices that deviate from the non-preemptive schedule, the latest first.
   , history :: !(IORef [Step])
   -- ^ The steps, the latest first.
+  , mistaken :: !(IORef (Maybe SomeException))
+  -- ^ What makes the run void.
   , emitted :: !(IORef [Event])
   -- ^ The events of its trace, the latest first.
   , reached :: !(IORef Reached)
@@ -184,6 +186,7 @@ newSim options policyOf = do
   commits <- newIORef 0
   deviations <- newIORef []
   history <- newIORef []
+  mistaken <- newIORef Nothing
   emitted <- newIORef []
   reached <- newIORef nothingYet
   runEnd <- newEmptyMVar
