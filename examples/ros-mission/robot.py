@@ -106,7 +106,10 @@ def new_goal(what, request):
 
 
 def cancel(goal):
-    note(*doing, "cancel")
+    with lock:
+        # (The goal may have ended since the cancel came.)
+        if doing:
+            note(*doing, "cancel")
     return CancelResponse.ACCEPT
 
 

@@ -56,7 +56,8 @@ spec = guarded $ do
   locked these what = if what `elem` these then aborted else slow
   aborted = slow {endsWith = Aborts (object ["sequence" .= [0 :: Int]])}
   failing place name =
-    "the robot failed: mission > " ++ place ++ " > goal: " ++ name ++ ": " ++ name ++ " aborted the goal: {"
+    concat
+      ["the robot failed: mission > ", place, " > goal: ", name, ": ", name, " aborted the goal: {\"sequence\":[0]}"]
   stubborn = slow {endsAfter = 50, confirmsAfter = 1 / 0}
 
 -- | What the robot does with a goal (its action, and the number of the door), and what happens when.
