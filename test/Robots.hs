@@ -21,6 +21,7 @@ import Behavior.Time (timeout)
 import Robots.Agreeing
 import Robots.Cancelling
 import Robots.Clients
+import Robots.Cost
 import Robots.Lies
 import Robots.Losing
 import Robots.Missions
@@ -41,6 +42,7 @@ rows =
   , (10, hostile)
   , (12, twoClients)
   , (13, twoRobots)
+  , (15, costs)
   , (16, agreeing)
   ]
 

@@ -62,7 +62,7 @@ data Stage = Stage
 newStage :: IO Stage
 newStage = do
   place <- getEnv "ROBOTS"
-  handle <- openFile (place ++ "/believed") WriteMode
+  handle <- openFile (place ++ "/believed") AppendMode
   hSetBuffering handle LineBuffering
   Stage <$> newMVar handle <*> newIORef 0 <*> (words <$> getEnv "ROBOTS_BRIDGE") <*> pure place <*> longCounts
  where

@@ -1,10 +1,11 @@
-"""A bridge that is none: it speaks the websocket and lies to its one client, and its own record is what the judge
+"""A bridge that is none: it speaks the websocket and lies to its client, and its own record is what the judge
 believes. (No library: those refuse to send what a client has to survive.)
 
 bridge.py PORT FOLDER hostile COUNT: COUNT hostile frames, each of which the client has to name or count.
 bridge.py PORT FOLDER flood RATE SECONDS: messages at that rate, and a pulse every 20 ms.
+bridge.py PORT FOLDER answer: for any number of clients, each of which is answered at once.
 
-It is the child of its client, whose memory it reads. FOLDER/lies has a line of JSON for each thing that happened;
+It is the child of its first client, whose memory it reads. FOLDER/lies has a line of JSON for each thing that happened;
 FOLDER/record what became of goals, as that of the action servers (actions.py).
 """
 
@@ -309,7 +310,40 @@ def flood(client, rate, seconds):
     client.send(frame(message("/over", number)))
 
 
+# --- answers ----------------------------------------------------------------------
+
+
+class Answered(Client):
+    """One whose goals end at once when it cancels them, or when their order is 0; which receives what it publishes; and
+    the time, on a topic."""
+
+    def take(self, request, at):
+        if request["op"] == "send_action_goal" and request["args"]["order"] == 0:
+            self.send(frame(result(request["id"], 4)))
+        elif request["op"] == "cancel_action_goal":
+            self.send(frame(result(request["id"], 5)))
+        elif request["op"] == "publish":
+            self.send(frame(message("/heard", request["msg"]["data"])))
+        elif request["op"] == "subscribe" and request["topic"] == "/time":
+            threading.Thread(target=self.tell_the_time, daemon=True).start()
+
+    def tell_the_time(self):
+        try:
+            while True:
+                time.sleep(0.002)
+                self.send(frame(message("/time", clock())))
+        except OSError:
+            pass  # it is no longer there
+
+
+def result(name, status):
+    return text(op="action_result", action="/any", id=name, status=status, result=status == 4,
+                values={"sequence": [0]})
+
+
 listening = socket.create_server(("127.0.0.1", PORT))
+while MODE == "answer":
+    Answered(listening)
 client = Client(listening)
 note(event="connected")
 if MODE == "hostile":

@@ -393,6 +393,26 @@ def row_13():
     print(f"row 13: the other robot's goals took {statistics.median(took):.3f} s, at most {max(took):.3f} s")
 
 
+def row_15():
+    took = collections.defaultdict(list)
+    for entry in believed[15]:
+        for what, seconds in entry.get("took", {}).items():
+            took[entry["client"], what] += seconds
+    for what, other, most in ("message", "roslibpy", 1), ("goal", "roslibpy", 1), ("cancel", "roslibpy", 1), (
+            "reaction", "bare", 1.5):
+        ours, theirs = took["ours", what], took[other, what]
+        wanted = 200 if what == "cancel" else 1000
+        if not len(ours) == len(theirs) == wanted:
+            claim(15, f"{what}: measured, ours and {other}", f"{len(ours)} and {len(theirs)}", wanted, False)
+            continue
+        mine, its = statistics.median(ours), statistics.median(theirs)
+        claim(15, f"{what}: ours {mine * 1e6:.0f} us, {other} {its * 1e6:.0f} us (median): ratio", f"{mine / its:.2f}",
+              f"at most {most}", mine <= most * its)
+    watched = took["ours", "reaction to a topic that must not be silent"]
+    if watched:
+        print(f"row 15: a reaction to a topic that must not be silent: {statistics.median(watched) * 1e6:.0f} us")
+
+
 def row_16():
     cases = [e for e in believed[16] if "case" in e]
     all_of(16, "cases that end as with fake robots", (e for e in cases if e["gave"] == e["expected"]), cases, 11)

@@ -24,7 +24,7 @@ module Behavior.Ros.Internal.Topic
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, bracket_, throw, toException)
-import Control.Monad (join, void, when)
+import Control.Monad (join, unless, void, when)
 import Data.Aeson (Value)
 import Data.Foldable (traverse_)
 import qualified Data.Map.Strict as Map
@@ -227,7 +227,8 @@ watchSilence ros name silence known judged = do
       Just arrival | arrivedAt arrival + silence >= begun -> follow (arrivedAt arrival) n <$ writeTVar judged (From n)
       _ -> follow begun n <$ writeTVar judged (From (n + 1))
  where
-  follow since n = do
+  -- (For a topic that may be silent there is nothing more to watch.)
+  follow since n = unless (silence == 1 / 0) $ do
     sleepUntil (since + silence / 2)
     next n (askAgain >> judge since n)
   judge since n = do
