@@ -147,6 +147,14 @@ spec = guarded $ do
         try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
         Signal.waitUntil ((== 0) <$> movingGoals ros)
         atomically (runningGoals robot) >>= (`shouldBe` [])
+    it "a goal is not taken for an ended one by what was said before the link froze" . underSchedules 40 $ do
+      let slowToAccept = succeeding {acceptedAfter = 1.5, endsAfter = 8}
+      mission (named [("first", succeeding), ("cup", slowToAccept)]) $ \robot ros -> do
+        void (carrying ros "first")
+        let losing = sleep 0.1 >> loseLink robot >> sleep 0.3 >> restoreLink robot >> sleepForever
+        _ <- firstOf [losing, tried (carrying ros "cup") <* awaitUp ros]
+        sleep 0.5 >> freezeLink robot >> sleep 2
+        Signal.read (movingGoals ros) >>= (`shouldBe` 1)
     it "the robot is asked again whether the old goal runs, if a new bridge has not said" . underSchedules 40 $
       mission (const succeeding {endsAfter = 3}) $ \robot ros -> do
         let losing = sleep 1 >> loseLink robot >> sleepForever

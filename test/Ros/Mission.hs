@@ -102,12 +102,14 @@ data Level = High | Low | Unmeasured
 worlds :: Gen World
 worlds = do
   isSerial <- frequency [(8, pure False), (1, pure True)]
-  World
-    <$> (choose (1, 4) >>= \n -> vectorOf n (resize 6 missions))
-    <*> resize 8 (listOf1 planned)
-    <*> (choose (0, 4) >>= \n -> vectorOf n ((,) <$> ticks <*> happening isSerial))
-    <*> frequency [(2, pure Nothing), (1, Just <$> choose (0, 150))]
-    <*> pure isSerial
+  world <-
+    World
+      <$> (choose (1, 4) >>= \n -> vectorOf n (resize 6 missions))
+      <*> resize 8 (listOf1 planned)
+      <*> (choose (0, 4) >>= \n -> vectorOf n ((,) <$> ticks <*> happening isSerial))
+      <*> frequency [(2, pure Nothing), (1, Just <$> choose (0, 150))]
+      <*> pure isSerial
+  frequency [(3, pure world), (1, outlived world)]
  where
   planned =
     Plan
@@ -121,6 +123,22 @@ worlds = do
       [(4, Charge <$> frequency [(3, pure Low), (2, pure High), (1, pure Unmeasured)])]
         ++ [(2, Loses <$> ticks) | not isSerial]
         ++ [(1, Freezes <$> ticks) | not isSerial]
+
+-- | It begins so: a goal runs for much longer than its link, and others come when there is a link again.
+outlived :: World -> Gen World
+outlived world = do
+  accepted <- elements [0, 80]
+  which <- choose (0, 2)
+  lost <- (,) <$> elements [5, 20] <*> (Loses <$> elements [1, 30])
+  later <- Then . Pause <$> elements [30, 120, 200]
+  pure
+    world
+      { phases = Goal False which : later (Goal False which) : phases world
+      , plans = Plan accepted 300 Succeeding (Just 0) False : plans world
+      , happenings = lost : happenings world
+      , stopAt = Nothing
+      , serial = False
+      }
 
 ticks :: Gen Int
 ticks = elements [0, 1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 50]

@@ -177,6 +177,9 @@ writing ros connection first = do
 settling :: Ros -> Behavior a
 settling ros = do
   sleep (patience (rosOptions ros))
+  -- (What was said before the link froze is no longer true.)
+  anyCame <- atomically (pinged ros)
+  atomically (anyCame >>= check)
   more <- atomically (settle ros)
   if more then settling ros else sleepForever
 
@@ -185,9 +188,15 @@ settling ros = do
 pinging :: Ros -> Behavior a
 pinging ros = forever $ do
   sleep (pingEvery options)
-  before <- atomically (writeTVar (pingWanted ros) True >> readTVar (received ros))
-  timeout (pongWithin options) (atomically (anyAfter before >>= check))
+  anyCame <- atomically (pinged ros)
+  timeout (pongWithin options) (atomically ((||) <$> readTVar (isReading ros) <*> anyCame >>= check))
     ? throwIO (LinkEnds ("nothing was received within " ++ show (pongWithin options) ++ " s after a ping"))
  where
   options = rosOptions ros
-  anyAfter before = (||) <$> readTVar (isReading ros) <*> ((/= before) <$> readTVar (received ros))
+
+-- | Sends a ping: whether anything has come since.
+pinged :: Ros -> STM (STM Bool)
+pinged ros = do
+  writeTVar (pingWanted ros) True
+  before <- readTVar (received ros)
+  pure ((/= before) <$> readTVar (received ros))
