@@ -19,16 +19,16 @@ import Behavior
 import Behavior.Parallel (firstOf)
 import Behavior.Time (timeout)
 import Robots.Agreeing
+import Robots.Campaign
 import Robots.Cancelling
 import Robots.Clients
 import Robots.Cost
 import Robots.Lies
 import Robots.Losing
 import Robots.Missions
-import Robots.Stage
 import Robots.Topics
 
-rows :: [(Row, Stage -> Behavior ())]
+rows :: [(Row, Campaign -> Behavior ())]
 rows =
   [ (1, missions)
   , (2, atRandomInstants)
@@ -50,19 +50,19 @@ main :: IO ()
 main = do
   arguments <- map read <$> getArgs
   unless (all (`elem` map fst rows) arguments) $ die ("robots: the rows are " ++ unwords (map (show . fst) rows))
-  stage <- newStage
-  runBehavior . for_ rows $ \(n, row) -> when (n `elem` arguments) (runRow stage n (row stage))
+  campaign <- newCampaign
+  runBehavior . for_ rows $ \(n, row) -> when (n `elem` arguments) (runRow campaign n (row campaign))
 
 -- | Writes how the row ended, and by how much a thread that slept beside it was late at most: so late may all that is
 -- measured there be. (A fault of one row does not end the others.)
-runRow :: Stage -> Row -> Behavior () -> Behavior ()
-runRow stage n row = do
+runRow :: Campaign -> Row -> Behavior () -> Behavior ()
+runRow campaign n row = do
   latest <- newIORef 0
   begun <- clock
-  how <- tryAny (firstOf [timeout (if isLong stage then 1800 else 150) row, lateness latest])
+  how <- tryAny (firstOf [timeout (if isLong campaign then 1800 else 150) row, lateness latest])
   ended <- clock
   late <- readIORef latest
-  note stage n
+  note campaign n
     ["row ended" .= either displayException (const "well") how, "seconds" .= (ended - begun), "late" .= late]
  where
   lateness latest = forever $ do

@@ -14,14 +14,14 @@ import System.Posix.Signals (sigKILL)
 import Behavior
 import Behavior.Ros
 import Behavior.Time (timeout)
+import Robots.Campaign
 import Robots.Goals
-import Robots.Stage
 import Ros.Cases
 
-agreeing :: Stage -> Behavior ()
-agreeing stage = withBridge stage 9090 $ \bridge way -> do
-  awaitServers stage 16 way ["/fast", "/stubborn", "/steady", "/brief", "/picky"]
+agreeing :: Campaign -> Behavior ()
+agreeing campaign = withBridge campaign 9090 $ \bridge way -> do
+  awaitServers campaign 16 way ["/fast", "/stubborn", "/steady", "/brief", "/picky"]
   for_ cases $ \it -> do
-    let host ros = Host ros (endBridge sigKILL bridge) (startBridge stage bridge)
+    let host ros = Host ros (endBridge sigKILL bridge) (startBridge campaign bridge)
     gave <- tryAny (timeout 20 (withRosWith impatient {patience = 2} way (mission it . host)))
-    note stage 16 ["case" .= title it, "gave" .= either (pure . displayException) id gave, "expected" .= outcome it]
+    note campaign 16 ["case" .= title it, "gave" .= either (pure . displayException) id gave, "expected" .= outcome it]

@@ -13,19 +13,19 @@ import Behavior
 import Behavior.Parallel (allOf)
 import Behavior.Ros
 import Behavior.Ros.Action
+import Robots.Campaign
 import Robots.Goals
-import Robots.Stage
 
 -- | Both have several goals at a time; one cancels many of its own, the other none. (Their links call their goals by
 -- the same names.)
-twoClients :: Stage -> Behavior ()
-twoClients stage = withBridge stage 9090 $ \_ way -> withRos way $ \ours -> withRos way $ \theirs -> do
-  awaitServers stage 12 way ["/brief"]
+twoClients :: Campaign -> Behavior ()
+twoClients campaign = withBridge campaign 9090 $ \_ way -> withRos way $ \ours -> withRos way $ \theirs -> do
+  awaitServers campaign 12 way ["/brief"]
   traverse_ awaitBridge [ours, theirs]
   let sending ros = plainly ros (replacing (fibonacci "/brief"))
       cancelling = do
         instant <- somewhere 0 0.3
-        void (interrupted stage 12 [("client", "ours")] (sleep instant) (sending ours))
-      inPeace = uninterrupted stage 12 [("client", "theirs")] (sending theirs)
+        void (interrupted campaign 12 [("client", "ours")] (sleep instant) (sending ours))
+      inPeace = uninterrupted campaign 12 [("client", "theirs")] (sending theirs)
       each act = void (allOf (replicate 2 (replicateM_ 250 act)))
   each cancelling `both` each inPeace

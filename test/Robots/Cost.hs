@@ -23,12 +23,12 @@ import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Messages
 import Behavior.STM
+import Robots.Campaign
 import Robots.Goals
-import Robots.Stage
 
 -- | In turn, so that all have the same machine.
-costs :: Stage -> Behavior ()
-costs stage = withLies stage ["answer"] $ \way -> replicateM_ 5 $ do
+costs :: Campaign -> Behavior ()
+costs campaign = withLies campaign ["answer"] $ \way -> replicateM_ 5 $ do
   withRos way $ \ros -> do
     awaitBridge ros
     wrote "ours" "message" =<< messages ros
@@ -37,12 +37,12 @@ costs stage = withLies stage ["answer"] $ \way -> replicateM_ 5 $ do
     wrote "ours" "reaction" =<< reactions (topic "/time" latched) ros
     wrote "ours" "reaction to a topic that must not be silent" =<< reactions (topic "/time" (atLeastEvery 2)) ros
   wrote "bare" "reaction" =<< bareReactions
-  theirs <- readProcess (folder stage ++ "/venv/bin/python3") ["test/robots/client.py", "9099", show count] ""
-  either fail (\took -> note stage 15 ["client" .= ("roslibpy" :: Text), "took" .= (took :: Value)]) $
+  theirs <- readProcess (folder campaign ++ "/venv/bin/python3") ["test/robots/client.py", "9099", show count] ""
+  either fail (\took -> note campaign 15 ["client" .= ("roslibpy" :: Text), "took" .= (took :: Value)]) $
     eitherDecodeStrict (Bytes.pack theirs)
  where
   wrote :: Text -> Key -> [Double] -> Behavior ()
-  wrote client what took = note stage 15 ["client" .= client, "took" .= object [what .= took]]
+  wrote client what took = note campaign 15 ["client" .= client, "took" .= object [what .= took]]
 
 count :: Int
 count = 200

@@ -29,7 +29,7 @@ import Behavior.Ros.Action
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)
-import Robots.Stage
+import Robots.Campaign
 import Ros.Stage (failureOrFault, fibonacci)
 
 -- | Sends a goal with that order.
@@ -45,13 +45,13 @@ untilFeedback ros which act order =
 
 -- | Sends a goal with that order, and writes when that was, when its stop was requested, when and how it ended, and
 -- what it gave. What it throws is thrown.
-believing :: Stage -> Row -> [(Text, String)] -> Int -> IORef (Maybe Double) -> Sending -> Behavior ()
-believing stage row more order stopAt send = do
+believing :: Campaign -> Row -> [(Text, String)] -> Int -> IORef (Maybe Double) -> Sending -> Behavior ()
+believing campaign row more order stopAt send = do
   begun <- clock
   how <- try (send order)
   ended <- clock
   stopped <- readIORef stopAt
-  note stage row $
+  note campaign row $
     ["order" .= order, "begun" .= begun, "stop" .= stopped, "ended" .= ended, "outcome" .= outcome how]
       ++ ["result" .= result | Right result <- [how]]
       ++ ["why" .= displayException why | Left why <- [how]]
@@ -68,36 +68,36 @@ outcome how = case how of
     | otherwise -> "other"
 
 -- | Sends a goal whose stop is never requested. What it throws is thrown.
-uninterrupted :: Stage -> Row -> [(Text, String)] -> Sending -> Behavior ()
-uninterrupted stage row more send = do
-  order <- newOrder stage
+uninterrupted :: Campaign -> Row -> [(Text, String)] -> Sending -> Behavior ()
+uninterrupted campaign row more send = do
+  order <- newOrder campaign
   stopAt <- newIORef Nothing
-  believing stage row more order stopAt send
+  believing campaign row more order stopAt send
 
 -- | Sends a goal whose stop is requested when the behaviour has ended: gives when that was. (Whatever the goal throws
 -- is only written.)
-interrupted :: Stage -> Row -> [(Text, String)] -> Behavior () -> Sending -> Behavior (Maybe Double)
-interrupted stage row more instant send = do
-  order <- newOrder stage
+interrupted :: Campaign -> Row -> [(Text, String)] -> Behavior () -> Sending -> Behavior (Maybe Double)
+interrupted campaign row more instant send = do
+  order <- newOrder campaign
   stopAt <- newIORef Nothing
   void . tryAny $
-    firstOf [believing stage row more order stopAt send, instant >> clock >>= writeIORef stopAt . Just]
+    firstOf [believing campaign row more order stopAt send, instant >> clock >>= writeIORef stopAt . Just]
   readIORef stopAt
 
 -- | Waits until goals reach these servers over the bridge: one that has just started loses them. (They are sent over a
 -- link of their own, and their orders are not written.)
-awaitServers :: Stage -> Row -> Transport -> [String] -> Behavior ()
-awaitServers stage row bridge names =
+awaitServers :: Campaign -> Row -> Transport -> [String] -> Behavior ()
+awaitServers campaign row bridge names =
   withRosWith defaultRosOptions {patience = 0.1} bridge $ \ros -> for_ names $ \name -> do
     reached <- newTVarIO False
     let reach = atomically (writeTVar reached True)
         go n = do
-          order <- newOrder stage
+          order <- newOrder campaign
           _ <- tryAny . timeout 0.3 $ firstOf
             [ void (untilFeedback ros (replacing (fibonacci name)) reach order)
             , atomically (readTVar reached >>= check)
             ]
           there <- readTVarIO reached
           unless there (if n < 50 then go (n + 1) else failWith ("no goal reaches " ++ name))
-          when there (note stage row ["server" .= name, "lost by the bridge" .= (n - 1 :: Int)])
+          when there (note campaign row ["server" .= name, "lost by the bridge" .= (n - 1 :: Int)])
     go 1

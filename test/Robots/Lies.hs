@@ -26,14 +26,14 @@ import Behavior.Ros.Messages
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Time (every, timeout)
+import Robots.Campaign
 import Robots.Goals
-import Robots.Stage
 import Ros.Stage (failureOrFault)
 
 -- | While a goal runs, each frame is answered: by the line about it, or by what a signal says of the reading. (The
 -- lines that nothing has time for are left out, and counted.)
-hostile :: Stage -> Behavior ()
-hostile stage = withLies stage ["hostile", "10000"] $ \way -> do
+hostile :: Campaign -> Behavior ()
+hostile campaign = withLies campaign ["hostile", "10000"] $ \way -> do
   reported <- newTBQueueIO 16
   let options = defaultRosOptions {onReport = atomically . writeTBQueue reported}
   withRosWith options way $ \ros -> do
@@ -43,11 +43,11 @@ hostile stage = withLies stage ["hostile", "10000"] $ \way -> do
     publishing ros (publication "/said") $ \say -> withMessages ros readings 16 $ \inbox ->
       firstOf
         [ do
-            uninterrupted stage 10 [] (plainly ros (fibonacci "/fake"))
+            uninterrupted campaign 10 [] (plainly ros (fibonacci "/fake"))
             refused <- Signal.read (refusedFrames ros)
-            note stage 10 ["refused" .= refused]
+            note campaign 10 ["refused" .= refused]
             -- Now come frames as large as is allowed: a map.
-            uninterrupted stage 10 [] (plainly ros (fibonacci "/fake"))
+            uninterrupted campaign 10 [] (plainly ros (fibonacci "/fake"))
               `both` void (Signal.read (latest ros (upToBytes 10000000 (topic "/map" latched) :: Topic Value)))
         , forever (atomically (readTBQueue reported) >>= say . Std . Text.pack)
         , forever (atomically (receive inbox) >> judging >>= say . Std . verdict)
@@ -61,9 +61,9 @@ verdict = \case
 
 -- | Messages faster than one reader takes them, while there is a reaction to others; then those which a real bridge
 -- carries.
-floods :: Stage -> Behavior ()
-floods stage = do
-  withLies stage ["flood", "10000", if isLong stage then "30" else "10"] $ \way -> withRos way $ \ros -> do
+floods :: Campaign -> Behavior ()
+floods campaign = do
+  withLies campaign ["flood", "10000", if isLong campaign then "30" else "10"] $ \way -> withRos way $ \ros -> do
     awaitBridge ros
     let numbers name = topic name latched :: Topic (Std Int32)
         newest name = unStd <$> latest ros (numbers name)
@@ -85,9 +85,9 @@ floods stage = do
           waited <- atomically (unhandled inbox)
           Taken handled disorder _ _ <- readTVarIO taken
           lost <- atomically (dropped inbox)
-          note stage 9
+          note campaign 9
             ["reader" .= name, "handled" .= handled, "waiting" .= waited, "dropped" .= lost, "disorder" .= disorder]
-  withBridge stage 9090 $ \_ way -> carried stage way 250
+  withBridge campaign 9090 $ \_ way -> carried campaign way 250
 
 -- | What a reader has taken: how many messages, how many of which were not later than the one before, the first number
 -- and the last.
@@ -106,8 +106,8 @@ taking taken inbox = do
 -- | How many of two seconds' messages a real bridge carries: at that rate, and at twice as much, as long as that is
 -- 99 %. (It drops what does not fit into its queue, or ends the connection: so each rate has one of its own. Those
 -- before the first one that arrives do not count: the bridge has just subscribed.)
-carried :: Stage -> Transport -> Int32 -> Behavior ()
-carried stage way rate = do
+carried :: Campaign -> Transport -> Int32 -> Behavior ()
+carried campaign way rate = do
   taken <- newTaken
   let anyCame = readTVar taken >>= \(Taken n _ _ _) -> check (n > 0)
       lastCame = readTVar taken >>= \(Taken _ _ _ m) -> check (m == 2 * rate)
@@ -121,6 +121,6 @@ carried stage way rate = do
   Taken n _ begun ended <- readTVarIO taken
   let wanted = 2 * fromIntegral rate - fromIntegral begun + 1
       almostAll = ended > 0 && 100 * n >= 99 * wanted
-  note stage 9
+  note campaign 9
     ["rate" .= rate, "wanted" .= wanted, "arrived" .= n, "end" .= either displayException (const "well") end]
-  when (almostAll && rate < 64000) $ carried stage way (2 * rate)
+  when (almostAll && rate < 64000) $ carried campaign way (2 * rate)

@@ -3,10 +3,10 @@
 -- |
 -- What the rows have in common: what the program believes is written to a file, in lines of JSON, which
 -- @test/robots/judge.py@ compares with what the action servers have recorded; and bridges, which can be killed.
-module Robots.Stage
+module Robots.Campaign
   ( -- * What the program believes
-    Stage (..)
-  , newStage
+    Campaign (..)
+  , newCampaign
   , Row
   , note
   , clock
@@ -48,8 +48,8 @@ import Behavior.Ros
 import qualified Behavior.Signal as Signal
 import Behavior.Time (timeout)
 
--- | Where everything is written, and how a bridge is started.
-data Stage = Stage
+-- | A run of the rows: where everything is written, and how a bridge is started.
+data Campaign = Campaign
   { believed :: MVar Handle
   , orders :: IORef Int
   , command :: [String]
@@ -59,12 +59,12 @@ data Stage = Stage
 
 -- | From the environment: @ROBOTS@ is the folder, @ROBOTS_BRIDGE@ the command that starts a bridge, and @LONG@ is set
 -- for the long counts.
-newStage :: IO Stage
-newStage = do
+newCampaign :: IO Campaign
+newCampaign = do
   place <- getEnv "ROBOTS"
   handle <- openFile (place ++ "/believed") AppendMode
   hSetBuffering handle LineBuffering
-  Stage <$> newMVar handle <*> newIORef 0 <*> (words <$> getEnv "ROBOTS_BRIDGE") <*> pure place <*> longCounts
+  Campaign <$> newMVar handle <*> newIORef 0 <*> (words <$> getEnv "ROBOTS_BRIDGE") <*> pure place <*> longCounts
  where
   longCounts = maybe False (not . null) <$> lookupEnv "LONG"
 
@@ -72,17 +72,18 @@ newStage = do
 type Row = Int
 
 -- | Writes a line: all of it, also in a thread whose stop is requested.
-note :: Stage -> Row -> [Pair] -> IO ()
-note stage row pairs =
-  uninterruptibleMask_ . withMVar (believed stage) $ \h -> Bytes.hPutStrLn h (encode (object (("row" .= row) : pairs)))
+note :: Campaign -> Row -> [Pair] -> IO ()
+note campaign row pairs =
+  uninterruptibleMask_ . withMVar (believed campaign) $ \h ->
+    Bytes.hPutStrLn h (encode (object (("row" .= row) : pairs)))
 
 -- | CLOCK_MONOTONIC, which the servers read, too.
 clock :: IO Double
 clock = getMonotonicTime
 
 -- | An order that no other goal has.
-newOrder :: Stage -> IO Int
-newOrder stage = atomicModifyIORef' (orders stage) (\n -> (n + 1, n + 1))
+newOrder :: Campaign -> IO Int
+newOrder campaign = atomicModifyIORef' (orders campaign) (\n -> (n + 1, n + 1))
 
 -- | A bridge, which may be killed and started again.
 data Bridge = Bridge
@@ -91,27 +92,27 @@ data Bridge = Bridge
   }
 
 -- | A bridge on that port while the behaviour runs.
-withBridge :: Stage -> Int -> (Bridge -> Transport -> Behavior a) -> Behavior a
-withBridge stage port use =
+withBridge :: Campaign -> Int -> (Bridge -> Transport -> Behavior a) -> Behavior a
+withBridge campaign port use =
   bracket (Bridge port <$> newIORef Nothing) (endBridge sigKILL) $ \bridge -> do
-    startBridge stage bridge
+    startBridge campaign bridge
     use bridge (rosbridge ("ws://127.0.0.1:" ++ show port))
 
 -- | While the behaviour runs, a bridge that is none, in a process of its own, which reads this one's memory:
 -- @test/robots/bridge.py@ with these arguments.
-withLies :: Stage -> [String] -> (Transport -> Behavior a) -> Behavior a
-withLies stage arguments use = do
-  output <- openFile (folder stage ++ "/servers") AppendMode
-  let python = proc "python3" (["test/robots/bridge.py", "9099", folder stage] ++ arguments)
+withLies :: Campaign -> [String] -> (Transport -> Behavior a) -> Behavior a
+withLies campaign arguments use = do
+  output <- openFile (folder campaign ++ "/servers") AppendMode
+  let python = proc "python3" (["test/robots/bridge.py", "9099", folder campaign] ++ arguments)
       begin = createProcess python {std_in = NoStream, std_out = UseHandle output, std_err = UseHandle output}
       end (_, _, _, process) = terminateProcess process >> void (waitForProcess process)
   bracket begin end (\_ -> use (rosbridge "ws://127.0.0.1:9099"))
 
 -- | Starts it. (It is there some 0.2 s later.)
-startBridge :: Stage -> Bridge -> IO ()
-startBridge stage bridge = do
-  output <- openFile (folder stage ++ "/bridge-" ++ show (onPort bridge)) AppendMode
-  let (program, arguments) = (head (command stage), tail (command stage) ++ ["--bind", address])
+startBridge :: Campaign -> Bridge -> IO ()
+startBridge campaign bridge = do
+  output <- openFile (folder campaign ++ "/bridge-" ++ show (onPort bridge)) AppendMode
+  let (program, arguments) = (head (command campaign), tail (command campaign) ++ ["--bind", address])
       address = "127.0.0.1:" ++ show (onPort bridge)
   (_, _, _, process) <-
     createProcess (proc program arguments) {std_in = NoStream, std_out = UseHandle output, std_err = UseHandle output}
