@@ -113,26 +113,26 @@ data Observed = Observed
 -- | A part: the label of its branch, if it has a thread of its own, and how it ended, if it has.
 data Entry = Entry (Maybe String) (Maybe (Ending Result))
 
--- | Where a part runs: for which operator, and in which branch.
-data Position = Position Observed (Maybe String)
+-- | What a part is: of which operator, and in which branch.
+data Role = Role Observed (Maybe String)
 
 -- | Runs the part of a program.
-behavior :: Context -> Environment Position Result -> Part -> Behavior Result
+behavior :: Context -> Environment Role Result -> Part -> Behavior Result
 behavior t around = \case
   Leaf act -> pure <$> perform (stage t) (pure ()) (recordViolation t Structure "a cleanup was interrupted") act
   Calm -> [] <$ atomically (modifyTVar' (world t) (calm <$))
-  Op o -> observed t o (\position -> Language.run (language t) around position position o)
+  Op o -> observed t o (\role -> Language.run (language t) around role role o)
 
 -- | The library's operators, with each part observed.
-language :: Context -> Language Position Sensing Part Result
+language :: Context -> Language Role Sensing Part Result
 language t =
   Language
-    { runPart = \around position -> observedPart t position . behavior t around
-    , inBranch = \label (Position o _) -> Position o (Just label)
-    , signalOf = \around position -> \case
+    { runPart = \around role -> observedPart t role . behavior t around
+    , inBranch = \label (Role o _) -> Role o (Just label)
+    , signalOf = \around role -> \case
         Watched levels -> levelIn levels <$> watching reading
         Polled n levels ->
-          levelIn levels <$> polling (fromIntegral n * tick (stage t)) (judgeLabel t position >> atomically reading)
+          levelIn levels <$> polling (fromIntegral n * tick (stage t)) (judgeLabel t role >> atomically reading)
         Shared -> nearest around
     , reactsTo = id
     , Language.tick = tick (stage t)
@@ -149,13 +149,13 @@ sawNothing = "nothing is seen"
 recordViolation :: Context -> Clause -> String -> IO ()
 recordViolation t clause = append (recordedViolations t) . (,) clause
 
--- | Observes one run of the operator, which gets its position, and records the violations at its end.
-observed :: Context -> Operator Sensing Part -> (Position -> Behavior Result) -> Behavior Result
+-- | Observes one run of the operator, which gets its role, and records the violations at its end.
+observed :: Context -> Operator Sensing Part -> (Role -> Behavior Result) -> Behavior Result
 observed t o body = do
   state <- getMaskingState
   mask $ \restore -> do
     this <- Observed (void o) state <$> newIORef 0 <*> newIORef []
-    end <- try (restore (body (Position this Nothing)))
+    end <- try (restore (body (Role this Nothing)))
     n <- readIORef (running this)
     unless (n == 0) $
       recordViolation t Structure (nameOf o ++ " has ended, but " ++ show n ++ " of its branches have not")
@@ -166,13 +166,13 @@ observed t o body = do
   withoutSign = if isJust (operatorName o) || forks o then map abs else id
 
 -- | Observes a part of an operator.
-observedPart :: Context -> Position -> Behavior Result -> Behavior Result
-observedPart t position@(Position this branch) act = do
+observedPart :: Context -> Role -> Behavior Result -> Behavior Result
+observedPart t role@(Role this branch) act = do
   state <- getMaskingState
   mask $ \restore -> do
     unless (state == maybe (callerState this) (const Unmasked) branch) $
       recordViolation t Masking (name ++ " runs " ++ show state)
-    judgeLabel t position
+    judgeLabel t role
     others <- atomicModifyIORef' (running this) (\n -> (n + 1, n))
     before <- readIORef (entries this)
     case branch of
@@ -190,20 +190,20 @@ observedPart t position@(Position this branch) act = do
     atomicModifyIORef' (running this) (\n -> (n - 1, ()))
     either (\e -> throwIO (e :: SomeException)) pure end
  where
-  name = nameOfPart position
+  name = nameOfPart role
 
 -- | Records a violation if the thread does not have the label of the branch.
-judgeLabel :: Context -> Position -> Behavior ()
-judgeLabel t position@(Position _ branch) = for_ branch $ \expected -> do
+judgeLabel :: Context -> Role -> Behavior ()
+judgeLabel t role@(Role _ branch) = for_ branch $ \expected -> do
   self <- Map.lookup <$> myThreadId <*> readIORef (threadLabels t)
   unless (fmap show self == Just expected) $
-    recordViolation t Labels (nameOfPart position ++ " runs in a thread that is labelled " ++ show self)
+    recordViolation t Labels (nameOfPart role ++ " runs in a thread that is labelled " ++ show self)
 
 nameOf :: Show s => Operator s p -> String
 nameOf = show . void
 
-nameOfPart :: Position -> String
-nameOfPart (Position this branch) = maybe ("a part of " ++ nameOf (operator this)) show branch
+nameOfPart :: Role -> String
+nameOfPart (Role this branch) = maybe ("a part of " ++ nameOf (operator this)) show branch
 
 -- | Whether the branch has completed despite a stop request. (A handler that has does not keep its rule from being
 -- stopped.)
