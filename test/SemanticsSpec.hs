@@ -434,7 +434,9 @@ relation = do
     it "are not false when they have no value any more, or fault" $ do
       with [Change 1 "p" NoValue] (RSelect (Watched "p") (act "l" 3 (Succeeds 1)) (act "r" 3 (Succeeds 2)))
         `endsWith` [Gave 1 (FailedWith noValue)]
-      with [Change 1 "p" Faulting] (WhileHolding (Watched "p") (act "a" 3 (Succeeds 1)) `Else` WaitUntil (Watched "p"))
+      with
+        [Change 1 "p" ThrowsFault]
+        (WhileHolding (Watched "p") (act "a" 3 (Succeeds 1)) `Else` WaitUntil (Watched "p"))
         `endsWith` [Gave 1 (FaultedWith "p")]
     it "skip the slots that a slow reading has missed" $
       WaitUntil (Polled 2 (Do "s" [script 0 (Succeeds 0), script 3 (Succeeds 0), script 0 (Succeeds 1)]))

@@ -50,7 +50,7 @@ data SensorFailure = SensorFailure Operator Sensor SensorError Bool Act
 data Sensor = WatchedSensor | PolledSensor Int
   deriving (Eq, Show)
 
-data SensorError = Failing | Faulting | LosingValue
+data SensorError = ReadingFails | ReadingFaults | ValueIsLost
   deriving (Eq, Show)
 
 sensorFailures :: Size -> Gen SensorFailure
@@ -60,7 +60,7 @@ sensorFailures size = do
       then pure WatchedSensor
       else frequency [(1, pure WatchedSensor), (2, PolledSensor <$> choose (1, 2))]
   fromTheStart <- frequency [(4, pure False), (1, pure True)]
-  cause <- elements ([Failing, Faulting] ++ [LosingValue | sensor == WatchedSensor, not fromTheStart])
+  cause <- elements ([ReadingFails, ReadingFaults] ++ [ValueIsLost | sensor == WatchedSensor, not fromTheStart])
   op <- elements operators
   act <- acts 7
   pure (SensorFailure op sensor cause fromTheStart act)
@@ -77,9 +77,9 @@ notTakenForFalse stage (SensorFailure op sensor cause fromTheStart act) = do
         readTVar dead >>= \case
           False -> pure True
           True -> case cause of
-            Failing -> failWith "the sensor"
-            Faulting -> throwSTM (Fault "the sensor")
-            LosingValue -> retry
+            ReadingFails -> failWith "the sensor"
+            ReadingFaults -> throwSTM (Fault "the sensor")
+            ValueIsLost -> retry
       signal = case sensor of
         WatchedSensor -> watching reading
         PolledSensor n -> Signal.polling (fromIntegral n * tick stage) (atomically reading)
@@ -99,11 +99,11 @@ notTakenForFalse stage (SensorFailure op sensor cause fromTheStart act) = do
             FailsToStop -> FailedWith ("Failure " ++ show (show (number act)))
             FaultsInCleanup -> FaultedWith (show (Fault ("the cleanup of " ++ show (number act))))
       sensors = case cause of
-        Failing -> FailedWith "FailedBecause \"the sensor\""
-        Faulting -> FaultedWith (show (Fault "the sensor"))
-        LosingValue -> FailedWith "FailedBecause \"the signal has no value any more\""
+        ReadingFails -> FailedWith "FailedBecause \"the sensor\""
+        ReadingFaults -> FaultedWith (show (Fault "the sensor"))
+        ValueIsLost -> FailedWith "FailedBecause \"the signal has no value any more\""
       -- The sensor may also have faulted once more while it was stopped: then that is thrown.
-      again = [sensors | cause == Faulting, sensor /= WatchedSensor]
+      again = [sensors | cause == ReadingFaults, sensor /= WatchedSensor]
   unless (end `elem` map Gave (expected : again)) $
     broken ("it ended: " ++ show end ++ ", and not: " ++ show expected)
 

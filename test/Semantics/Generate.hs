@@ -26,7 +26,7 @@ worlds wanted deep = do
   someChanges = do
     n <- choose (0, 8)
     inOrder <$> vectorOf n (Change <$> choose (0, 8) <*> elements known <*> someLevel)
-  someLevel = frequency [(30, At <$> choose (0, 2)), (1, pure NoValue), (1, pure Failing), (1, pure Faulting)]
+  someLevel = frequency [(30, At <$> choose (0, 2)), (1, pure NoValue), (1, pure ThrowsFailure), (1, pure ThrowsFault)]
 
 -- | Worlds that are small enough to try all their schedules.
 smallWorlds :: Gen World

@@ -41,9 +41,9 @@ data Level
   | -- | There is no value: its transaction retries.
     NoValue
   | -- | Its transaction throws a failure.
-    Failing
+    ThrowsFailure
   | -- | Its transaction throws a fault.
-    Faulting
+    ThrowsFault
   deriving (Eq, Ord, Show)
 
 -- | A program, the initial levels of the conditions, their changes, and when the caller

@@ -238,8 +238,8 @@ language instrument emit context = this
       readTVar var >>= \case
         At n -> pure n
         NoValue -> retry
-        Failing -> throwSTM (Failure condition)
-        Faulting -> throwSTM (Fault condition)
+        ThrowsFailure -> throwSTM (Failure condition)
+        ThrowsFault -> throwSTM (Fault condition)
 
 -- | An exception that the run ended with, as a result.
 thrown :: SomeException -> Result

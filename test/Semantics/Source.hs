@@ -139,8 +139,8 @@ readSource :: Now -> ReadMode -> View -> Source -> Maybe (Either Result (Int, No
 readSource t mode v source = case source of
   Watching condition -> case (Map.lookup condition (levels t), mode) of
     (Just (At n), _) -> gives n
-    (Just Failing, _) -> wrong (FailedWith condition)
-    (Just Faulting, _) -> wrong (FaultedWith condition)
+    (Just ThrowsFailure, _) -> wrong (FailedWith condition)
+    (Just ThrowsFault, _) -> wrong (FaultedWith condition)
     (_, FirstRead) -> Nothing
     (_, Reread) -> wrong (FailedWith noValue)
   Deadline end -> gives (fromEnum (clock t >= end))
