@@ -23,6 +23,7 @@ import Behavior.Ros.Internal.FakeScript
 import Behavior.Ros.Internal.FakeState
 import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Message
+import Behavior.Ros.Internal.Options (RosOptions (frameBytes, frameDepth), defaultRosOptions)
 import Behavior.Ros.Internal.StopAll (Cancelling (..))
 import Behavior.Ros.Internal.Transport
 import Behavior.STM (atomically)
@@ -77,7 +78,7 @@ fakeRos robot =
 
 -- | Does what a frame asks for.
 obey :: FakeRobot -> Client -> Seconds -> ByteString -> STM ()
-obey robot it time frame = case decodeRequest (Limits 1048576 64) frame of
+obey robot it time frame = case decodeRequest limits frame of
   Left why -> answer it (Complaint Nothing (Text.pack why))
   Right (Subscribe name _) -> do
     modifyTVar' (subscribed it) (Set.insert name)
@@ -114,6 +115,7 @@ obey robot it time frame = case decodeRequest (Limits 1048576 64) frame of
       can <- cancel time g
       unless can $ answer it (Complaint (Just n) "there is no such goal")
  where
+  limits = Limits (frameBytes defaultRosOptions) (frameDepth defaultRosOptions)
   -- Whether it has accepted the goal, and so can.
   cancel at g = do
     accepted <- readTVar (isAccepted g)
