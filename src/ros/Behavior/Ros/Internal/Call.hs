@@ -60,7 +60,7 @@ class (RosMessage (Question a), RosMessage (Answer a)) => RosService a where
   -- | What it answers: the response.
   type Answer a
 
-  -- | The type's name. (If it is empty, the bridge takes the one that the service has.)
+  -- | The typeNames name. (If it is empty, the bridge takes the one that the service has.)
   serviceType :: Proxy a -> Text
 
 -- | A service without a type of its own: see 'untypedService'.
@@ -88,7 +88,7 @@ service name = Service (Text.pack name) (serviceType (Proxy :: Proxy a))
 --
 -- @since 0.1.0.0
 untypedService :: String -> String -> Service Value
-untypedService name type' = Service (Text.pack name) (Text.pack type')
+untypedService name typeName = Service (Text.pack name) (Text.pack typeName)
 
 -- | Calls a service, and waits for its answer.
 --
@@ -112,8 +112,8 @@ untypedService name type' = Service (Text.pack name) (Text.pack type')
 --
 -- @since 0.1.0.0
 call :: RosService a => Ros -> Service a -> Question a -> Behavior (Answer a)
-call ros (Service relative type') question = named ("call: " ++ name) $ do
-  (_, _, message) <- inFull (there, type', toRos question)
+call ros (Service relative typeName) question = named ("call: " ++ name) $ do
+  (_, _, message) <- inFull (there, typeName, toRos question)
   mask $ \restore -> do
     (n, reply) <- handOver ros restore (asking message)
     (restore (answerTo reply) `finally` atomically (modifyTVar' (calls ros) (Map.delete n))) >>= \case
@@ -129,6 +129,6 @@ call ros (Service relative type') question = named ("call: " ++ name) $ do
   asking message = do
     n <- Text.pack . ("call " ++) . show <$> newNumber ros
     reply <- newTVar Nothing
-    ask ros (CallService n there type' message)
+    ask ros (CallService n there typeName message)
     modifyTVar' (calls ros) (Map.insert n reply)
     pure (n, reply)

@@ -74,24 +74,25 @@ data Limits = Limits
 -- | The frame, for the bridge.
 encodeRequest :: Request -> Bytes.ByteString
 encodeRequest request = encode . object $ case request of
-  Subscribe t type' -> ["op" .= op "subscribe", "id" .= subscription t, "topic" .= t] ++ ["type" .= type' | type' /= ""]
+  Subscribe t typeName -> ["op" .= op "subscribe", "id" .= subscription t, "topic" .= t] ++ optional typeName
   Unsubscribe t -> ["op" .= op "unsubscribe", "id" .= subscription t, "topic" .= t]
-  SendGoal n action type' arguments ->
+  SendGoal n action typeName arguments ->
     [ "op" .= op "send_action_goal"
     , "id" .= n
     , "action" .= action
-    , "action_type" .= type'
+    , "action_type" .= typeName
     , "args" .= arguments
     , "feedback" .= True
     ]
   CancelGoal n action -> ["op" .= op "cancel_action_goal", "id" .= n, "action" .= action]
-  Advertise t type' latch ->
-    ["op" .= op "advertise", "id" .= advertisement t, "topic" .= t, "type" .= type', "latch" .= latch]
+  Advertise t typeName latch ->
+    ["op" .= op "advertise", "id" .= advertisement t, "topic" .= t, "type" .= typeName, "latch" .= latch]
   Unadvertise t -> ["op" .= op "unadvertise", "id" .= advertisement t, "topic" .= t]
   Publish t message -> ["op" .= op "publish", "topic" .= t, "msg" .= message]
-  CallService n service type' arguments ->
-    ["op" .= op "call_service", "id" .= n, "service" .= service, "args" .= arguments] ++ ["type" .= type' | type' /= ""]
+  CallService n service typeName arguments ->
+    ["op" .= op "call_service", "id" .= n, "service" .= service, "args" .= arguments] ++ optional typeName
  where
+  optional typeName = ["type" .= typeName | typeName /= ""]
   subscription t = "subscription of " <> t
   advertisement t = "advertisement of " <> t
 

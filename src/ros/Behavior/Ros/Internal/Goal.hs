@@ -76,7 +76,7 @@ class (RosMessage (Goal a), RosMessage (Result a), RosMessage (Feedback a)) => R
   -- | What is known meanwhile.
   type Feedback a
 
-  -- | The type's name.
+  -- | The typeNames name.
   actionType :: Proxy a -> Text
 
 -- | An action without a type of its own: see 'untyped'.
@@ -109,7 +109,7 @@ action name = Action (Text.pack name) (actionType (Proxy :: Proxy a)) False
 --
 -- @since 0.1.0.0
 untyped :: String -> String -> Action Value
-untyped name type' = Action (Text.pack name) (Text.pack type') False
+untyped name typeName = Action (Text.pack name) (Text.pack typeName) False
 
 -- | The same action, of whose server you know that a new goal replaces the one before (Nav2's is so), or that it can
 -- work on several: a goal of ours that may still run is no reason to refuse a new one.

@@ -231,15 +231,15 @@ newNumber ros = readTVar (nextNumber ros) >>= \n -> n <$ (writeTVar (nextNumber 
 
 -- | The topic with this name, subscribed to.
 keptOf :: Ros -> Text -> Text -> Seconds -> STM Kept
-keptOf ros name type' time =
+keptOf ros name typeName time =
   readTVar (kept ros) >>= \topics -> case Map.lookup name topics of
     Just topic -> pure topic
     Nothing -> do
       topic <-
-        Kept <$> newTVar Nothing <*> newTVar 0 <*> newTVar time <*> pure type' <*> newTVar Map.empty <*> newTVar 0
+        Kept <$> newTVar Nothing <*> newTVar 0 <*> newTVar time <*> pure typeName <*> newTVar Map.empty <*> newTVar 0
       writeTVar (kept ros) (Map.insert name topic topics)
       l <- readTVar (link ros)
-      when (isUp l) (ask ros (Subscribe name type'))
+      when (isUp l) (ask ros (Subscribe name typeName))
       pure topic
 
 -- | Messages of the topic may have the given number of bytes, from now on.

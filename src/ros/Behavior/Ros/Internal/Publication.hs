@@ -60,7 +60,7 @@ publication name = Publication (Text.pack name) (messageType (Proxy :: Proxy a))
 --
 -- @since 0.1.0.0
 untypedPublication :: String -> String -> Publication Value
-untypedPublication name type' = Publication (Text.pack name) (Text.pack type') False
+untypedPublication name typeName = Publication (Text.pack name) (Text.pack typeName) False
 
 -- | The same topic, whose last message the bridge keeps for those who subscribe later. (ROS 1 calls that latched, ROS 2
 -- transient local.)
@@ -119,11 +119,11 @@ begin ros which = do
   known <- readTVar (advertised ros)
   next <- case Map.lookup (nameOf which) known of
     Nothing -> new <$ whenUp ros (Advertise (nameOf which) (typeOf which) (keepsLast which))
-    Just (Advertised type' keeps n)
-      | type' == typeOf which && keeps == keepsLast which -> pure (Advertised type' keeps (n + 1))
+    Just (Advertised typeName keeps n)
+      | typeName == typeOf which && keeps == keepsLast which -> pure (Advertised typeName keeps (n + 1))
       | otherwise ->
           throwSTM . ErrorCall $
-            "publishing: " ++ Text.unpack (nameOf which) ++ " is published already, as " ++ Text.unpack type'
+            "publishing: " ++ Text.unpack (nameOf which) ++ " is published already, as " ++ Text.unpack typeName
   writeTVar (advertised ros) (Map.insert (nameOf which) next known)
  where
   new = Advertised (typeOf which) (keepsLast which) 1
@@ -133,8 +133,8 @@ finish :: Ros -> Text -> STM ()
 finish ros name = do
   known <- readTVar (advertised ros)
   case Map.lookup name known of
-    Just (Advertised type' keeps n)
-      | n > 1 -> writeTVar (advertised ros) (Map.insert name (Advertised type' keeps (n - 1)) known)
+    Just (Advertised typeName keeps n)
+      | n > 1 -> writeTVar (advertised ros) (Map.insert name (Advertised typeName keeps (n - 1)) known)
       | otherwise -> do
           writeTVar (advertised ros) (Map.delete name known)
           whenUp ros (Unadvertise name)

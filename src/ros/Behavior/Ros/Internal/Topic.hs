@@ -199,10 +199,10 @@ withMessages ros which capacity behavior =
 -- | The topic, subscribed to.
 subscribed :: forall a. RosMessage a => Ros -> Topic a -> Behavior Kept
 subscribed ros which = do
-  (name, type') <- inFull (absolute ros (topicName which), messageType (Proxy :: Proxy a))
+  (name, typeName) <- inFull (absolute ros (topicName which), messageType (Proxy :: Proxy a))
   time <- now
   atomically $ do
-    known <- keptOf ros name type' time
+    known <- keptOf ros name typeName time
     known <$ wantBytes ros known (atMostBytes which)
 
 -- | Which messages count.

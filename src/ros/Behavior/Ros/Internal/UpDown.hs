@@ -39,7 +39,7 @@ comeUp ros time = do
     modifyTVar' (arrivedBy known) (min (time + patience (rosOptions ros)))
   let moving = nub (map sentTo before)
   pure $
-    [Advertise name type' keeps | (name, Advertised type' keeps _) <- Map.toList topicsOfOurs]
+    [Advertise name typeName keeps | (name, Advertised typeName keeps _) <- Map.toList topicsOfOurs]
       ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
       ++ map subscribeStatus moving
 
