@@ -64,8 +64,8 @@ serving server robot listening = scoped $ \nursery -> forever $ do
 orBridge :: [(String, Value -> GoalScript)] -> IO () -> IO ()
 orBridge actions program = lookupEnv variable >>= maybe program (const (withFakeRobot actions robotAndBridge))
  where
-  robotAndBridge robot = withBridge robot $ \address' -> do
-    putStrLn address' >> hFlush stdout
+  robotAndBridge robot = withBridge robot $ \bridgeAddress -> do
+    putStrLn bridgeAddress >> hFlush stdout
     let obey = isEOF >>= \over -> if over then pure () else getLine >>= does >> obey
         does command = (if command == "cut" then loseLink robot else restoreLink robot) >> putStrLn "" >> hFlush stdout
     obey
@@ -79,9 +79,9 @@ withBridgeProcess act = do
   let other = (proc program []) {env = Just ((variable, "1") : environment), std_in = CreatePipe, std_out = CreatePipe}
   withCreateProcess other $ \input output _ process -> case (input, output) of
     (Just to, Just from) -> do
-      address' <- hGetLine from
+      bridgeAddress <- hGetLine from
       let tell command = hPutStrLn to command >> hFlush to >> void (hGetLine from)
-      act (rosbridge address') (tell "cut") (tell "mend") <* hClose to <* waitForProcess process
+      act (rosbridge bridgeAddress) (tell "cut") (tell "mend") <* hClose to <* waitForProcess process
     _ -> fail "no pipes"
 
 variable :: String

@@ -34,19 +34,19 @@ spec :: Spec
 spec = guarded $ do
   describe "What is no frame" $ do
     it "is refused, counted and reported, and the goal goes on" . underSchedules 10 $ do
-      lines' <- newIORef []
-      let options = defaultRosOptions {onReport = \line -> modifyIORef lines' (line :)}
+      reported <- newIORef []
+      let options = defaultRosOptions {onReport = \line -> modifyIORef reported (line :)}
       missionWith options (const slowly) $ \robot ros -> do
         Signal.waitUntil (linkUp ros)
         let sending = sleep 1 >> forM_ hostile (sendBytes robot . fst) >> sleepForever
         _ <- firstOf [sending, inSeconds 60 (carrying ros "cup")]
         Signal.read (refusedFrames ros) >>= (`shouldBe` length hostile)
-        said <- reverse <$> readIORef lines'
+        said <- reverse <$> readIORef reported
         forM_ (zip said (map snd hostile)) $ \(line, why) -> line `shouldSatisfy` (why `isInfixOf`)
         length said `shouldBe` length hostile
     it "is counted also when there are too many lines, each of which is a short one" . underSchedules 10 $ do
-      lines' <- newIORef []
-      let options = defaultRosOptions {onReport = \line -> sleep 1 >> modifyIORef' lines' (line :)}
+      reported <- newIORef []
+      let options = defaultRosOptions {onReport = \line -> sleep 1 >> modifyIORef' reported (line :)}
           complaint = Bytes.concat ["{\"op\":\"status\",\"msg\":\"no\\nsuch ", Chars.replicate 5000 'x', "\"}"]
       missionWith options (const slowly) $ \robot ros -> do
         Signal.waitUntil (linkUp ros)
@@ -54,7 +54,7 @@ spec = guarded $ do
         sleep 100
         sendBytes robot "?"
         sleep 1.5
-        said <- reverse <$> readIORef lines'
+        said <- reverse <$> readIORef reported
         head said `shouldBe` "the bridge complains: no such " ++ replicate 170 'x' ++ "..."
         let leftOut = [read n | line <- said, "(and" : n : _ <- [dropWhile (/= "(and") (words line)]]
         length said + sum leftOut `shouldBe` 201
@@ -160,8 +160,8 @@ spec = guarded $ do
   isLost e = case e of
     LinkLost _ why -> "nothing was received" `isInfixOf` why
     _ -> False
-  allowed (address', is) = it (show address' ++ " is " ++ (if is then "allowed" else "refused")) $ do
-    end <- try (withRos (rosbridge address') (\_ -> pure ()))
+  allowed (bridgeAddress, is) = it (show bridgeAddress ++ " is " ++ (if is then "allowed" else "refused")) $ do
+    end <- try (withRos (rosbridge bridgeAddress) (\_ -> pure ()))
     either (\(ErrorCall _) -> False) (const True) end `shouldBe` is
 
 -- | The frames that are sent to a bridge which takes so long for each, and answers nothing; by a mission that is given

@@ -249,9 +249,9 @@ data Doing = Doing FakeRobot Ros (IORef [(Seconds, Happening)]) (IORef [Leaf]) (
 
 -- | Runs the mission; whether it must not run unless the battery's level is high.
 run :: Doing -> Bool -> Mission -> Behavior ()
-run doing@(Doing robot ros events _ _) isGuarded' = \case
-  Goal False which -> leaf doing isGuarded' which (goal ros (actionFor which))
-  Goal True which -> leaf doing isGuarded' which $ \wanted ->
+run doing@(Doing robot ros events _ _) onlyWhenHigh = \case
+  Goal False which -> leaf doing onlyWhenHigh which (goal ros (actionFor which))
+  Goal True which -> leaf doing onlyWhenHigh which $ \wanted ->
     goalWith ros (actionFor which) wanted (\feedback -> Signal.waitUntil (True <$ feedback))
   Pause n -> pause n
   Then one other -> go one >> go other
@@ -261,14 +261,14 @@ run doing@(Doing robot ros events _ _) isGuarded' = \case
   Monitored recovery task -> Signal.monitor low (go recovery >> charge robot events High) (careful task)
   Instead emergency act -> Signal.insteadWhen low (go emergency) (careful act)
  where
-  go = run doing isGuarded'
+  go = run doing onlyWhenHigh
   careful = run doing True
   low = (< 0.1) <$> measured unStd (latest ros (topic "/level" latched :: Topic (Std (Maybe Double))))
   actionFor which = (if isReplacing which then replacing else id) (untyped (actionNames !! which) "a_robot/action/A")
 
 -- | A goal, and how it ended.
 leaf :: Doing -> Bool -> Int -> (Value -> Behavior Value) -> Behavior ()
-leaf (Doing robot ros _ ended orders) isGuarded' which act = mask $ \restore -> do
+leaf (Doing robot ros _ ended orders) onlyWhenHigh which act = mask $ \restore -> do
   n <- atomicModifyIORef orders (\n -> (n + 1, n))
   before <- now
   end <- try (restore (act (Number (fromIntegral n))))
@@ -276,7 +276,7 @@ leaf (Doing robot ros _ ended orders) isGuarded' which act = mask $ \restore -> 
   -- (These are no scheduling points.)
   running <- STM.atomically (runningGoals robot)
   moving <- Map.size <$> STM.readTVarIO (sent ros)
-  modifyIORef' ended (Leaf n which isGuarded' before after (outcomeOf end) running moving :)
+  modifyIORef' ended (Leaf n which onlyWhenHigh before after (outcomeOf end) running moving :)
   either throwIO (const (pure ())) end
 
 outcomeOf :: Either SomeException Value -> Outcome

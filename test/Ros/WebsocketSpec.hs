@@ -61,10 +61,10 @@ spec = guarded $ do
       restoreLink robot
       void (carrying ros "cup")
   it "what is published last comes to the robot before the link ends" $
-    withFakeRobot [] $ \robot -> withBridge robot $ \address' ->
+    withFakeRobot [] $ \robot -> withBridge robot $ \bridgeAddress ->
       forM_ [1 .. 30] $ \n -> do
         let speed = publication "/speed" :: Publication (Std (Maybe Double))
-        withRosWith patient (rosbridge address') (\ros -> publishing ros speed ($ Std (Just n)))
+        withRosWith patient (rosbridge bridgeAddress) (\ros -> publishing ros speed ($ Std (Just n)))
         came <- map snd <$> atomically (seen robot)
         came `shouldContain` [Published "/speed" (object ["data" .= n])]
   it "an answer to the handshake that does not end is refused" $
@@ -98,4 +98,4 @@ onSocket = onSocketWith patient
 onSocketWith :: RosOptions -> (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 onSocketWith options script act =
   withFakeRobot [("/carry", script)] $ \robot ->
-    withBridge robot (\address' -> withRosWith options (rosbridge address') (act robot))
+    withBridge robot (\bridgeAddress -> withRosWith options (rosbridge bridgeAddress) (act robot))

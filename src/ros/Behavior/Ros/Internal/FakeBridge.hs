@@ -59,10 +59,10 @@ fakeRos robot =
     modifyTVar' (clients robot) (filter ((/= isBroken it) . isBroken))
   connection received it =
     Connection
-      { receiveFrame = atomically (unlessBroken it (unlessFrozen (readTQueue (toClient it))))
-      , sendFrame = \frame -> now >>= \time -> atomically (unlessBroken it (unlessFrozen' (takeFrame it time frame)))
+      { receiveFrame = atomically (unlessBroken it (onceNotFrozen (readTQueue (toClient it))))
+      , sendFrame = \frame -> now >>= \time -> atomically (unlessBroken it (unlessFrozen (takeFrame it time frame)))
       , sendPing = atomically (unlessBroken it (readTVar (isFrozen robot))) >>= \frozen -> unless frozen received
-      , sendClose = atomically (unlessBroken it (unlessFrozen' (writeTVar (isBroken it) True)))
+      , sendClose = atomically (unlessBroken it (unlessFrozen (writeTVar (isBroken it) True)))
       }
   takeFrame it time frame = do
     later <- (&&) <$> readTVar (isSerial robot) <*> (not . Map.null <$> readTVar (goals robot))
@@ -73,8 +73,8 @@ fakeRos robot =
   unlessBroken it act =
     readTVar (isBroken it) >>= \broken ->
       if broken then throwSTM (userError "connection lost") else act
-  unlessFrozen act = readTVar (isFrozen robot) >>= check . not >> act
-  unlessFrozen' act = readTVar (isFrozen robot) >>= \frozen -> unless frozen act
+  onceNotFrozen act = readTVar (isFrozen robot) >>= check . not >> act
+  unlessFrozen act = readTVar (isFrozen robot) >>= \frozen -> unless frozen act
 
 -- | Does what a frame asks for.
 obey :: FakeRobot -> Client -> Seconds -> ByteString -> STM ()
@@ -100,8 +100,8 @@ obey robot it time frame = case decodeRequest limits frame of
   Right (CallService n name _ question) -> do
     note robot time (Called (Text.unpack name) question)
     case Text.stripSuffix "/_action/cancel_goal" name of
-      Just action' | Map.member action' (scripts robot) -> do
-        found <- filter ((== action') . action) . Map.elems <$> readTVar (goals robot)
+      Just actionName | Map.member actionName (scripts robot) -> do
+        found <- filter ((== actionName) . action) . Map.elems <$> readTVar (goals robot)
         can <- filterM (cancel time) found
         answer it (Response n True (toRos (Cancelling 0 (map (goalId . number) can))))
       _ ->

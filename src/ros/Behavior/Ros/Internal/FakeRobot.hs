@@ -111,7 +111,7 @@ publish robot name = atomically . publishNow robot (Text.pack name)
 --
 -- @since 0.1.0.0
 offerService :: FakeRobot -> String -> (Value -> ServiceScript) -> Behavior ()
-offerService robot name script' = atomically (modifyTVar' (services robot) (Map.insert (Text.pack name) script'))
+offerService robot name scriptFor = atomically (modifyTVar' (services robot) (Map.insert (Text.pack name) scriptFor))
 
 -- | Sends these bytes as a frame, whatever they are.
 --

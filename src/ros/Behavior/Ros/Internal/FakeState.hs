@@ -93,7 +93,7 @@ publishStatus robot name = do
   running <- readTVar (goals robot) >>= filterM isRunning . Map.elems
   moving <- traverse (\g -> (\stops -> (number g, if stops then 3 else 2)) <$> readTVar (cancelWanted g)) running
   known <- map snd <$> readTVar (record robot)
-  let ofAction = [n | GoalCame n action' _ <- known, action' == Text.unpack name]
+  let ofAction = [n | GoalCame n actionName _ <- known, actionName == Text.unpack name]
       ended = [(n, status) | GoalEnded n status <- known, n `elem` ofAction, status /= 0]
   publishNow robot (statusOf name) . toRos . Statuses $
     [(goalId n, status) | (n, status) <- moving ++ ended]

@@ -120,11 +120,11 @@ connected ros transport = do
         named ("link: " ++ robot ros) $
           firstOf (map whyItEnds [reading ros connection, writing ros connection first, pinging ros, settling ros])
             >>= \why -> readTVarIO (link ros) >>= \l -> if isClosing l then pure why else throwIO (LinkEnds why)
-      connecting' = connecting transport (frameBytes (rosOptions ros)) (atomically (receivedAny ros)) use
+      oneConnection = connecting transport (frameBytes (rosOptions ros)) (atomically (receivedAny ros)) use
       tooLong = do
         timeout connectWithin (atomically (readTVar up >>= check)) ? throwIO (LinkEnds "it takes too long to connect")
         sleepForever
-  firstOf [either show id <$> tryAny connecting', whyItEnds tooLong]
+  firstOf [either show id <$> tryAny oneConnection, whyItEnds tooLong]
 
 -- | Why a link has ended.
 newtype LinkEnds = LinkEnds String
