@@ -83,8 +83,8 @@ perform file mode events remarks = case mode of
     attempt (Lazy.writeFile out (render (recording events)))
     pure ("", remarks)
   Compare other -> do
-    (events', remarks') <- load other
-    pure (renderDifference (difference (recording events) (recording events')), remarks ++ remarks')
+    (otherEvents, otherRemarks) <- load other
+    pure (renderDifference (difference (recording events) (recording otherEvents)), remarks ++ otherRemarks)
 
 -- The events of a file, and a remark if its last line is incomplete.
 load :: FilePath -> ExceptT String IO ([Event], [String])

@@ -23,9 +23,9 @@ main = do
   how <- runBehavior $ case mode o of
     Really -> end <$> viewing (shown o) (mission o putStrLn)
     Simulated number -> do
-      (report, m, events') <- simulatedWithEvents o (maybe NonPreemptive (Seeded . fromInteger) number)
+      (report, m, recorded) <- simulatedWithEvents o (maybe NonPreemptive (Seeded . fromInteger) number)
       traverse_ putStrLn report
-      viewEvents (shown o) events'
+      viewEvents (shown o) recorded
       pure (maybe NotOver end m)
     Explored n -> do
       missions <- explored n o

@@ -115,13 +115,13 @@ failedWith world failure = do
 --
 -- (The lines are not printed meanwhile: a simulation must not block on output.)
 simulated :: Options -> Schedule -> IO ([String], Maybe Mission)
-simulated o schedule' = (\(report, m, _) -> (report, m)) <$> simulatedWithEvents o schedule'
+simulated o schedule = (\(report, m, _) -> (report, m)) <$> simulatedWithEvents o schedule
 
 -- | The same, and the events of the run.
 simulatedWithEvents :: Options -> Schedule -> IO ([String], Maybe Mission, [Event])
-simulatedWithEvents o schedule' = do
+simulatedWithEvents o schedule = do
   printed <- newIORef []
-  run <- simulateWith options' (mission o (\text -> modifyIORef printed (text :)))
+  run <- simulateWith upToAnHour (mission o (\text -> modifyIORef printed (text :)))
   report <- reverse <$> readIORef printed
   case outcome run of
     Returned m -> pure (report, Just m, events run)
@@ -131,9 +131,9 @@ simulatedWithEvents o schedule' = do
     other -> throwIO (ErrorCall ("the simulation: " ++ explain other))
  where
   notOver report run = pure (report ++ [inWords NotOver], Nothing, events run)
-  options' =
+  upToAnHour =
     defaultSimOptions
-      { Sim.scheduled = schedule'
+      { Sim.scheduled = schedule
       , Sim.endAt = 3600 -- takes a few seconds of real time
       , Sim.realTimeLimit = 1 / 0 -- the user can press Ctrl-C
       }
