@@ -104,7 +104,7 @@ partSpace :: Double
 partSpace = 7
 
 -- | The class of the shapes with this outcome.
-outcomeClass :: Outcome -> Text
+outcomeClass :: SpanOutcome -> Text
 outcomeClass o = case o of
   Success -> "s"
   RanAgain -> "a"
@@ -116,7 +116,7 @@ outcomeClass o = case o of
 
 -- | The outline of a bar. The right end is round if it succeeded, notched if it failed, jagged if
 -- it faulted, cut off if it was stopped or a signal ended it, and open if it was still running.
-barShape :: Outcome -> Double -> Double -> Double -> Double -> Text
+barShape :: SpanOutcome -> Double -> Double -> Double -> Double -> Text
 barShape outcome x y w h = Text.concat $ case outcome of
   RanAgain -> rounded
   Success -> rounded
@@ -140,7 +140,7 @@ barShape outcome x y w h = Text.concat $ case outcome of
 
 -- | The outline of a mark that is too narrow for a bar. It is taller if it failed (upwards), if it was
 -- stopped (downwards), or faulted (both).
-markShape :: Outcome -> Double -> Double -> Double -> Double -> Text
+markShape :: SpanOutcome -> Double -> Double -> Double -> Double -> Text
 markShape outcome x y w h =
   Text.concat ["M", px x, " ", px (y - up), "h", px w, "v", px (h + up + down), "h", px (-w), "Z"]
  where

@@ -18,7 +18,7 @@ import Behavior.Trace.Svg.Draw
 import Behavior.Trace.Svg.Outcome
 
 -- | The title, no wider than that number of pixels.
-title :: (Node -> Outcome) -> Double -> Recording -> [Part]
+title :: (Node -> SpanOutcome) -> Double -> Recording -> [Part]
 title outcomeOf width r = filter (not . null . snd) [("", lead), ("tr", fitted room remarks), ("w", missing)]
  where
   (known, remarks) = heading outcomeOf r
@@ -28,14 +28,14 @@ title outcomeOf width r = filter (not . null . snd) [("", lead), ("tr", fitted r
   room = (width - large lead - large missing) * 12 / 14
 
 -- | The title without the remark about lost events.
-titleText :: (Node -> Outcome) -> Recording -> String
+titleText :: (Node -> SpanOutcome) -> Recording -> String
 titleText outcomeOf r = unwords (filter (not . null) [lead, remarks])
  where
   (lead, remarks) = heading outcomeOf r
 
 -- How the outermost span ended; and how often something was interrupted, what did not succeed, and how much time was
 -- spent on what had to begin again.
-heading :: (Node -> Outcome) -> Recording -> (String, String)
+heading :: (Node -> SpanOutcome) -> Recording -> (String, String)
 heading outcomeOf r = (if null remarks then lead else lead ++ ":", intercalate ", " remarks)
  where
   (lead, parts) = case outermost r of

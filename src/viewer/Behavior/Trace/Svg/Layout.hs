@@ -92,7 +92,7 @@ firstFree ends height left = from
 -- | A span, or several with the same outcome that are drawn as one.
 data Mark = Mark
   { markLane :: !Int
-  , markOutcome :: !Outcome
+  , markOutcome :: !SpanOutcome
   , markLeft :: !Double
   , markRight :: !Double
   , markNode :: !Node
@@ -110,7 +110,7 @@ isMerged m = markCount m > 1
 -- merged with their neighbours of the same outcome; if there would be more marks than the given number, those of two
 -- pixels, of four, and so on. Marks of what failed, faulted, or was stopped are never part of a
 -- mark of another outcome.
-marks :: (Node -> Outcome) -> Int -> [Placed] -> [Mark]
+marks :: (Node -> SpanOutcome) -> Int -> [Placed] -> [Mark]
 marks outcomeOf budget placed = case filter few attempts of
   enough : _ -> enough
   [] -> last attempts
@@ -118,7 +118,7 @@ marks outcomeOf budget placed = case filter few attempts of
   attempts = map (\w -> mergedBelow outcomeOf w placed) (takeWhile (<= 256) (iterate (* 2) 1))
   few = null . drop budget
 
-mergedBelow :: (Node -> Outcome) -> Double -> [Placed] -> [Mark]
+mergedBelow :: (Node -> SpanOutcome) -> Double -> [Placed] -> [Mark]
 mergedBelow outcomeOf width placed = sortOn position (map single wide ++ concatMap merge (Map.toList narrow))
  where
   position m = (markLane m, markLeft m)

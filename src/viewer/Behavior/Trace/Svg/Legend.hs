@@ -16,7 +16,7 @@ import Behavior.Trace.Svg.Outcome
 
 -- | What a timeline contains.
 data Used = Used
-  { usedOutcomes :: [Outcome]
+  { usedOutcomes :: [SpanOutcome]
   , usedStopping :: !Bool
   -- ^ A part of a bar shows that it was being stopped.
   , usedChanges :: [Effect]

@@ -1,7 +1,7 @@
 -- |
 -- How the spans of a timeline ended.
 module Behavior.Trace.Svg.Outcome
-  ( Outcome (..)
+  ( SpanOutcome (..)
   , outcomes
   , endedBySignals
   , redone
@@ -19,7 +19,7 @@ import Behavior.Trace
 import Behavior.Trace.Recording
 
 -- | How a span ended.
-data Outcome
+data SpanOutcome
   = Success
   | -- | It succeeded, but what it ran in did not; and after that, something of its name ran once more.
     RanAgain
@@ -32,7 +32,7 @@ data Outcome
   deriving (Eq, Ord, Show, Enum, Bounded)
 
 -- | How each span of the recording ended.
-outcomes :: Recording -> Node -> Outcome
+outcomes :: Recording -> Node -> SpanOutcome
 outcomes r = outcome
  where
   again = ranAgain r
@@ -107,7 +107,7 @@ endedBySignals r = foldr below IntMap.empty (recordingRoots r)
 -- | How much time was spent on what had to begin again: on named spans without such spans in them that failed,
 -- faulted, were interrupted, or succeeded in vain, and of whose name one began after that. What lost against a part
 -- beside it is not among them.
-redone :: (Node -> Outcome) -> Recording -> Seconds
+redone :: (Node -> SpanOutcome) -> Recording -> Seconds
 redone outcomeOf r =
   sum
     [ t - spanBegan s
