@@ -19,7 +19,7 @@ module Ros.Mission
     -- * What comes of one
   , Report (..)
   , Leaf (..)
-  , Outcome (..)
+  , GoalOutcome (..)
   , inWorld
   , patienceHere
   , lostAfter
@@ -183,7 +183,7 @@ data Leaf = Leaf
   -- ^ Whether it must not run unless the battery's level is high.
   , begun :: Seconds
   , over :: Seconds
-  , outcome :: Outcome
+  , outcome :: GoalOutcome
   , runningThen :: [Int]
   -- ^ The robot's numbers of the goals that run when it is over.
   , movingThen :: Int
@@ -191,7 +191,7 @@ data Leaf = Leaf
   }
   deriving (Show)
 
-data Outcome
+data GoalOutcome
   = Completed Value
   | FailedWith RosFailure
   | FaultedWith RosFault
@@ -279,7 +279,7 @@ leaf (Doing robot ros _ ended orders) onlyWhenHigh which act = mask $ \restore -
   modifyIORef' ended (Leaf n which onlyWhenHigh before after (outcomeOf end) running moving :)
   either throwIO (const (pure ())) end
 
-outcomeOf :: Either SomeException Value -> Outcome
+outcomeOf :: Either SomeException Value -> GoalOutcome
 outcomeOf = \case
   Right value -> Completed value
   Left e
