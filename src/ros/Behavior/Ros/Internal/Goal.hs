@@ -239,7 +239,7 @@ start ros which wanted latest = do
   pure (name, running)
 
 -- | Cancels the goal, again and again, until it has ended or the patience has. One that was not sent yet is withdrawn.
-confirmation :: Ros -> Action a -> Text -> Sent -> Behavior (Maybe End)
+confirmation :: Ros -> Action a -> Text -> Sent -> Behavior (Maybe SentEnd)
 confirmation ros which n running = do
   begun <- now
   cleanupWithin limit (askEvery begun ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
@@ -261,5 +261,5 @@ confirmation ros which n running = do
   withdraw = (running `endWith` Ended 5 Null) >> modifyTVar' (sent ros) (Map.delete n)
   askForStatus = void . keptOf ros (statusOf (nameOf which)) (messageType (Proxy :: Proxy Statuses))
 
-awaitEnd :: Sent -> STM End
+awaitEnd :: Sent -> STM SentEnd
 awaitEnd running = readTVar (end running) >>= maybe retry pure

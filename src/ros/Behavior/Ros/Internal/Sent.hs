@@ -7,7 +7,7 @@
 module Behavior.Ros.Internal.Sent
   ( Sent (..)
   , newSent
-  , End (..)
+  , SentEnd (..)
   , endWith
   , setOnce
   ) where
@@ -27,7 +27,7 @@ data Sent = Sent
   , sentIn :: !Int
   -- ^ The number of the connection.
   , feedback :: TVar (Maybe Value)
-  , end :: TVar (Maybe End)
+  , end :: TVar (Maybe SentEnd)
   , isSent :: TVar Bool
   -- ^ Whether it no longer waits to be sent.
   , cancelled :: TVar Bool
@@ -45,13 +45,13 @@ newSent action connection latest =
     <$> newTVar Nothing <*> newTVar False <*> newTVar False <*> newTVar (1 / 0) <*> newTVar False
 
 -- | How a goal ended, as far as we know.
-data End
+data SentEnd
   = Ended !Int Value
   | Complained Text
   | Lost
 
 -- | Ends the goal, unless it has ended.
-endWith :: Sent -> End -> STM ()
+endWith :: Sent -> SentEnd -> STM ()
 endWith = setOnce . end
 
 -- | Of several values only the first counts.
