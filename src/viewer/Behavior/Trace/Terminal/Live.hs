@@ -7,7 +7,7 @@ module Behavior.Trace.Terminal.Live
   ( Live (..)
   , Active (..)
   , Done (..)
-  , Failed (..)
+  , FailedSpan (..)
   , Interruption (..)
   , nothingYet
   , watch
@@ -30,7 +30,7 @@ data Live = Live
   , liveDone :: ![Done]
   -- ^ Spans in no other that ended: the last ones, the latest first.
   , liveDoneCount :: !Int
-  , liveFailed :: ![Failed]
+  , liveFailed :: ![FailedSpan]
   -- ^ The last failures and faults, the latest first.
   , liveInterruption :: !(Maybe Interruption)
   -- ^ The last one.
@@ -66,7 +66,7 @@ data Done = Done
 
 -- | A failure or a fault: in which span, when, and how. Of one that came out of several spans, only
 -- the innermost is kept.
-data Failed = Failed
+data FailedSpan = FailedSpan
   { failedPath :: ![(Int, String)]
   -- ^ The span and those that it ran in, the innermost first.
   , failedAt :: !Seconds
@@ -199,7 +199,7 @@ ended s t end live = case spanParent s of
   -- The reactions of some may be lost.
   lastOnes known = if IntMap.size known > maxReactions then IntMap.deleteMin known else known
   noted
-    | isFailure end, not alreadyKnown = live {liveFailed = keep maxFailed (Failed path t end : liveFailed live)}
+    | isFailure end, not alreadyKnown = live {liveFailed = keep maxFailed (FailedSpan path t end : liveFailed live)}
     | otherwise = live
   path = keep maxPath ((number, spanName s) : [(spanNumber o, spanName o) | o <- ancestors (liveActive live) s])
   alreadyKnown = case liveFailed live of

@@ -115,7 +115,7 @@ interruptionLines width time live = case liveInterruption live of
  where
   short = cutTo (max 8 (width `div` 3))
 
-failedLine :: Seconds -> Failed -> Line
+failedLine :: Seconds -> FailedSpan -> Line
 failedLine time f = case map snd (failedPath f) of
   name : outer ->
     [ (Bad, "✗ " ++ nameText name ++ ": " ++ howText (failedHow f))
