@@ -2,7 +2,7 @@
 -- All the places where an operator runs a behaviour. The promises of every operator
 -- are tested in each of them.
 module Places
-  ( Place (..)
+  ( OperatorPlace (..)
   , places
   , threaded
   , inCaller
@@ -28,25 +28,25 @@ import Support
 
 -- | A place in an operator. All other branches of the operator do nothing: when the
 -- behaviour in this place ends, the operator ends in the same way.
-data Place = Place
+data OperatorPlace = OperatorPlace
   { placeName :: String
   , placeLabel :: Maybe Label
   -- ^ The label of the thread that runs the behaviour, if it is not the caller's.
   , placed :: Behavior () -> Behavior ()
   }
 
-instance Show Place where
+instance Show OperatorPlace where
   show = placeName
 
 -- | The places where a behaviour runs in a thread of its own.
-threaded :: [Place]
-threaded = [place | place@Place {placeLabel = Just _} <- places]
+threaded :: [OperatorPlace]
+threaded = [place | place@OperatorPlace {placeLabel = Just _} <- places]
 
 -- | The places where it runs in the caller's thread.
-inCaller :: [Place]
-inCaller = [place | place@Place {placeLabel = Nothing} <- places]
+inCaller :: [OperatorPlace]
+inCaller = [place | place@OperatorPlace {placeLabel = Nothing} <- places]
 
-places :: [Place]
+places :: [OperatorPlace]
 places =
   [ inPlace "the first of ?" (? throwIO theFailure)
   , inPlace "the second of ?" (failed ?)
@@ -107,8 +107,8 @@ places =
  where
   withMessages messages = withInbox 1 (\deliver -> pure () <$ traverse_ deliver messages)
   firstEnd ends = listToMaybe [either throwIO pure end | Just end <- ends]
-  inPlace name = Place name Nothing
-  inThread operator name = Place (show label) (Just label) where label = Label operator name
+  inPlace name = OperatorPlace name Nothing
+  inThread operator name = OperatorPlace (show label) (Just label) where label = Label operator name
   noException :: SomeException -> Bool
   noException _ = False
 

@@ -105,7 +105,7 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
 
 -- | The places of branches. (A sensor is not a branch: a cancellation of the caller takes
 -- precedence over a sensor's fault.)
-branches :: [Place]
+branches :: [OperatorPlace]
 branches = [place | place <- threaded, (labelBranch <$> placeLabel place) /= Just "polling"]
 
 -- | Cancels the caller after the first number of 'yield's, again after the second number
@@ -129,7 +129,7 @@ instance Arbitrary Moments where
   arbitrary = Moments <$> (choose (1, 3) >>= \n -> vectorOf n (frequency [(3, choose (0, 10)), (1, choose (0, 100))]))
   shrink (Moments moments) = [Moments fewer | fewer@(_ : _) <- shrink moments, all (>= 0) fewer]
 
-newtype Nest = Nest [Place]
+newtype Nest = Nest [OperatorPlace]
   deriving (Show)
 
 instance Arbitrary Nest where

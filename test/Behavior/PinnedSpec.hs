@@ -58,7 +58,7 @@ placement :: IO (Int, Bool)
 placement = myThreadId >>= threadCapability
 
 -- | That of the thread in that place.
-placementIn :: Place -> Behavior (Int, Bool)
+placementIn :: OperatorPlace -> Behavior (Int, Bool)
 placementIn place = do
   found <- newIORef (-1, False)
   placed place (placement >>= writeIORef found)

@@ -24,7 +24,7 @@ spec = guarded $ do
   describe "Operators within operators" nested
 
 -- | An example for each of the places.
-inEach :: [Place] -> String -> (Place -> IO ()) -> Spec
+inEach :: [OperatorPlace] -> String -> (OperatorPlace -> IO ()) -> Spec
 inEach these promise check =
   describe promise . forM_ these $ \place -> it (show place) (check place)
 

@@ -43,7 +43,7 @@ newtype Levels = Levels [Level]
 
 data Level
   = -- | Only runs the next level.
-    Around Place
+    Around OperatorPlace
   | -- | Stops the next level after the given number of ticks, or when another branch ends.
     ByTimeout Int
   | ByNeighbour
@@ -61,9 +61,9 @@ levels size = do
       pure (Levels (before ++ stopping ++ after))
  where
   around = Around <$> elements (trying : takingAll : places)
-  holding = Place "whileHolding" Nothing (Signal.whileHolding (pure True))
-  trying = Place "attempt 3" Nothing (attempt 3)
-  takingAll = Place "failingOn any" Nothing (failingOn (const True :: SomeException -> Bool))
+  holding = OperatorPlace "whileHolding" Nothing (Signal.whileHolding (pure True))
+  trying = OperatorPlace "attempt 3" Nothing (attempt 3)
+  takingAll = OperatorPlace "failingOn any" Nothing (failingOn (const True :: SomeException -> Bool))
 
 -- | The operator that stops its branch continues after the stop. The operators inside do not
 -- continue, not even with a fallback; those around it are not affected.
