@@ -4,13 +4,15 @@
 -- The same over a real websocket: a server on this machine, behind which is a fake robot.
 module Ros.WebsocketSpec (spec) where
 
+import Control.Concurrent.MVar
 import Control.Exception (bracket, try)
-import Control.Monad (forM_, forever, void)
+import Control.Monad (forM_, forever, void, when)
 import Data.Aeson (Value, object, (.=))
 import qualified Data.ByteString.Char8 as Chars
 import Network.Socket (accept, close, socketPort)
 import Network.Socket.ByteString (sendAll)
 import qualified Network.WebSockets as Websockets
+import System.IO.Unsafe (unsafeInterleaveIO)
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -19,6 +21,7 @@ import Behavior.Ros
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Link (received)
 import Behavior.Ros.Internal.Service
+import Behavior.Ros.Internal.Transport
 import Behavior.Ros.Messages
 import Behavior.STM
 import qualified Behavior.Signal as Signal
@@ -67,6 +70,26 @@ spec = guarded $ do
         withRosWith patient (rosbridge bridgeAddress) (\ros -> publishing ros speed ($ Std (Just n)))
         came <- map snd <$> atomically (seen robot)
         came `shouldContain` [Published "/speed" (object ["data" .= n])]
+  it "a link is not lost while a frame takes long to be read" $ do
+    (pings, isSubscribed, arriving) <- (,,) <$> newTVarIO (0 :: Int) <*> newTVarIO False <*> newEmptyMVar
+    frames <- newEmptyMVar
+    unsafeInterleaveIO (takeMVar arriving) >>= putMVar frames
+    let way = Transport {address = "slow", refusal = Nothing, connecting = \_ pong use -> use (connection pong)}
+        connection pong =
+          Connection
+            { receiveFrame = tryTakeMVar frames >>= maybe sleepForever pure
+            , sendFrame = \_ -> atomically (writeTVar isSubscribed True)
+            , -- (From the sixth on they are answered: the frame arrives after the eighth.)
+              sendPing = atomically (stateTVar pings (\n -> (n + 1, n + 1))) >>= \n -> when (n > 5) pong
+            , sendClose = pure ()
+            }
+        arrives = do
+          atomically $ (&&) <$> ((>= 8) <$> readTVar pings) <*> readTVar isSubscribed >>= check
+          putMVar arriving "{\"op\":\"publish\",\"topic\":\"/level\",\"msg\":{\"data\":0.5}}"
+    withRosWith defaultRosOptions {pingEvery = 0.01, pongWithin = 0.01} way $ \ros ->
+      arrives `both` do
+        level <- Signal.read (latest ros (topic "/level" latched))
+        level `shouldBe` Std (Just 0.5 :: Maybe Double)
   it "an answer to the handshake that does not end is refused" $
     bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
       port <- socketPort listening
