@@ -227,6 +227,19 @@ causes = do
     checkSpans seen
     eventually ((== living) <$> liveThreadCount)
 
+  it "it was abandoned, though a branch that it runs in is abandoned, too" $ do
+    mayEnd <- newGate
+    over <- newGate
+    living <- liveThreadCount
+    (_, seen) <- traceOf . named "outer" $ do
+      let inner = abandoning 0.01 (uninterruptibleMask_ (named "deep" (pass mayEnd))) `finally` Support.open over
+      timeout 0.001 (abandoning 0.001 inner) ? pure ()
+      pass over
+    [(spanName s, c) | Ended s _ (StoppedBy c) <- seen] `shouldBe` [("deep", WasAbandoned)]
+    checkSpans seen
+    Support.open mayEnd
+    eventually ((== living) <$> liveThreadCount)
+
   it "it was abandoned, also at the moment when it begins" $ do
     seen <- newIORef []
     abandon <- newIORef (pure ())

@@ -55,8 +55,8 @@ data Place = Place
   , path :: [String]
   -- ^ The names of the spans around it, the innermost first.
   , abandonable :: [IORef (Maybe (IntMap Open))]
-  -- ^ For each branch around it that may be abandoned: the spans that are open in that branch;
-  -- nothing once it has been abandoned.
+  -- ^ For each branch around it that may be abandoned: the spans that are open in that branch, whose end is still to be
+  -- reported; nothing once it has been abandoned.
   }
 
 -- | What is around a place. A receiver that needs no operators and branches does not see their spans.
@@ -76,8 +76,6 @@ data Open = Open
   , openSince :: !Seconds
   , openAt :: !Place
   -- ^ Where it began.
-  , claimed :: !(IORef Bool)
-  -- ^ Whether its end has been reported. (If the span may be abandoned, two threads can report it.)
   }
 
 -- | A trace while it is made. A trace inside another one uses the numbers of the outer one,

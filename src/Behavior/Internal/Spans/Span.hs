@@ -29,9 +29,9 @@ import Control.Exception
   , try
   , uninterruptibleMask_
   )
-import Control.Monad (unless, when)
+import Control.Monad (when)
 import Data.Foldable (for_, traverse_)
-import Data.IORef (IORef, atomicModifyIORef', newIORef)
+import Data.IORef (atomicModifyIORef', newIORef)
 import qualified Data.IntMap.Strict as IntMap
 import Data.Maybe (isJust)
 import Data.Traversable (for)
@@ -129,15 +129,14 @@ spanning :: SpanKind -> String -> Place -> IO a -> IO (Either SomeException a)
 spanning kind name place act = do
   n <- newNumber place
   t <- traceClock (trace place)
-  claim <- newIORef False
   open <- inTurn $ do
-    open <- register (Open n kind name t place claim)
+    open <- register (Open n kind name t place)
     open <$ reportSpan Began open
   end <- try (inPlace (Just (within open)) act)
   how <- endOf end
   inTurn $ do
-    endSpan how open
-    for_ (abandonable (openAt open)) (`modify` fmap (IntMap.delete n))
+    isOpen <- takeOff open
+    when isOpen (reportEnd how open)
   pure end
  where
   inTurn report = if null (abandonable place) then report else oneAtATime (trace place) report
@@ -159,9 +158,18 @@ register :: Open -> IO Open
 register open = do
   inAll <- for (abandonable place) $ \spans ->
     atomicModifyIORef' spans (\known -> (IntMap.insert (openNumber open) open <$> known, isJust known))
-  pure (if and inAll then open else open {openAt = (placeIn [InUnknown] (trace place)) {path = path place}})
+  if and inAll
+    then pure open
+    else open {openAt = (placeIn [InUnknown] (trace place)) {path = path place}} <$ takeOff open
  where
   place = openAt open
+
+-- | Takes it off these branches. Whether none of them has been abandoned: then its end was not reported yet.
+takeOff :: Open -> IO Bool
+takeOff open = and <$> for (abandonable (openAt open)) isIn
+ where
+  isIn spans = atomicModifyIORef' spans (\known -> (IntMap.delete n <$> known, maybe False (IntMap.member n) known))
+  n = openNumber open
 
 -- | Runs an action that starts a branch which may be abandoned. It also gives an action for the moment when
 -- the branch is abandoned, which reports the end of the spans that are open in it. Call it masked.
@@ -172,7 +180,7 @@ abandonableIn act =
     Just place -> do
       spans <- newIORef (Just IntMap.empty)
       a <- inPlace (Just place {abandonable = spans : abandonable place}) act
-      let ends known = traverse_ (endSpan (StoppedBy WasAbandoned)) (reverse (IntMap.elems known))
+      let ends = traverse_ (\open -> takeOff open >> reportEnd (StoppedBy WasAbandoned) open) . reverse . IntMap.elems
       pure (a, oneAtATime (trace place) (atomicModifyIORef' spans ((,) Nothing) >>= traverse_ ends))
 
 -- | Runs such reports one at a time. Otherwise the reports of a branch that is being abandoned could come in the
@@ -187,13 +195,10 @@ within open = inside {path = [openName open | openKind open == Named] ++ path pl
   place = openAt open
   inside = place {around = InSpan (openKind open) (openNumber open) : around place}
 
--- | Reports the end of a span, unless that was done.
-endSpan :: End -> Open -> IO ()
-endSpan how open = do
-  done <- atomicModifyIORef' (claimed open) ((,) True)
-  unless done $ do
-    t <- traceClock (trace (openAt open))
-    reportSpan (\s -> Ended s t how) open
+reportEnd :: End -> Open -> IO ()
+reportEnd how open = do
+  t <- traceClock (trace (openAt open))
+  reportSpan (\s -> Ended s t how) open
 
 reportSpan :: (Span -> Event) -> Open -> IO ()
 reportSpan event open = for_ (receivers (trace place)) $ \receiver ->
@@ -238,6 +243,3 @@ reportEach place event = for_ (receivers (trace place)) $ \receiver -> receiveEv
 -- | The number of the next span or reaction.
 newNumber :: Place -> IO Int
 newNumber place = atomicModifyIORef' (lastNumber (trace place)) (\n -> let next = n + 1 in (next, next))
-
-modify :: IORef a -> (a -> a) -> IO ()
-modify variable f = atomicModifyIORef' variable (\a -> (f a, ()))
