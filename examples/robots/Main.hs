@@ -104,10 +104,10 @@ pickAndPlaceDemo say = do
       , moveTo = \place -> case place of
           Box -> void (both (step say "move to the box" 1) slips)
           _ -> step say ("move to " ++ show place) 0.5
-      , gripper = \grip' -> do
-          step say (if grip' == Open then "open" else "close") 0.3
+      , gripper = \wanted -> do
+          step say (if wanted == Open then "open" else "close") 0.3
           holds <-
-            if grip' == Open
+            if wanted == Open
               then pure False
               else atomically (stateTVar grips (\left -> (take 1 left == [True], drop 1 left)))
           set held holds
