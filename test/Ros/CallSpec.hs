@@ -62,7 +62,7 @@ spec = guarded $ do
       inSeconds 1 (stopAfter 1 (call ros lights Null)) >>= (`shouldBe` Nothing)
 
     it "has the first of several answers, whatever comes after it" $ do
-      ros <- newRos "nowhere" defaultRosOptions
+      ros <- newRos "nowhere" "" defaultRosOptions
       reply <- newTVarIO Nothing
       atomically $ do
         _ <- comeUp ros 0

@@ -57,7 +57,7 @@ spec = guarded $ do
       -- (It has not subscribed again: it would have received the last message again.)
       subscriptions robot >>= (`shouldBe` [0])
     it "needs no more memory for many messages that no one reads" $ do
-      ros <- newRos "nowhere" defaultRosOptions
+      ros <- newRos "nowhere" "" defaultRosOptions
       _ <- atomically (comeUp ros 0 >> keptOf ros "/level" "" 0)
       inConstantMemory 100000 $ \step ->
         replicateM_ 100000 (atomically (Receive.take ros 0 100 (Message "/level" Null)) >> step)

@@ -9,6 +9,7 @@ import Control.Exception (bracket, try)
 import Control.Monad (forM_, forever, void, when)
 import Data.Aeson (Value, object, (.=))
 import qualified Data.ByteString.Char8 as Chars
+import Data.List (nub)
 import Network.Socket (accept, close, socketPort)
 import Network.Socket.ByteString (sendAll)
 import qualified Network.WebSockets as Websockets
@@ -19,6 +20,7 @@ import Behavior
 import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
+import Behavior.Ros.Internal.Frame (Limits (..), Request (SendGoal), decodeRequest)
 import Behavior.Ros.Internal.Link (received)
 import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
@@ -70,11 +72,23 @@ spec = guarded $ do
         withRosWith patient (rosbridge bridgeAddress) (\ros -> publishing ros speed ($ Std (Just n)))
         came <- map snd <$> atomically (seen robot)
         came `shouldContain` [Published "/speed" (object ["data" .= n])]
+  it "goals of two links have different names" $
+    withFakeRobot [("/carry", quickly)] $ \robot -> withBridge robot $ \url -> do
+      frames <- newTVarIO []
+      let keeping frame = atomically (modifyTVar' frames (frame :))
+          observed one = one {sendFrame = \frame -> keeping frame >> sendFrame one frame}
+          way = rosbridge url
+          watched = way {connecting = \bytes pong use -> connecting way bytes pong (use . observed)}
+      forM_ [1, 2 :: Int] $ \_ -> withRosWith patient watched (`carrying` "cup")
+      sent <- map (decodeRequest (Limits 10000 64)) <$> readTVarIO frames
+      let names = [n | Right (SendGoal n _ _ _) <- sent]
+      length names `shouldBe` 2
+      names `shouldBe` nub names
   it "a link is not lost while a frame takes long to be read" $ do
     (pings, isSubscribed, arriving) <- (,,) <$> newTVarIO (0 :: Int) <*> newTVarIO False <*> newEmptyMVar
     frames <- newEmptyMVar
     unsafeInterleaveIO (takeMVar arriving) >>= putMVar frames
-    let way = Transport {address = "slow", refusal = Nothing, connecting = \_ pong use -> use (connection pong)}
+    let way = Transport "slow" Nothing (pure "") (\_ pong use -> use (connection pong))
         connection pong =
           Connection
             { receiveFrame = tryTakeMVar frames >>= maybe sleepForever pure

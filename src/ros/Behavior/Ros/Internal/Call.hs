@@ -127,7 +127,7 @@ call ros (Service relative typeName) question = named ("call: " ++ name) $ do
   limit = tooSlowAfter (rosOptions ros)
   answerTo reply = timeout limit (Just <$> atomically (readTVar reply >>= maybe retry pure)) ? pure Nothing
   asking message = do
-    n <- Text.pack . ("call " ++) . show <$> newNumber ros
+    n <- newId ros (Text.pack "call")
     reply <- newTVar Nothing
     ask ros (CallService n there typeName message)
     modifyTVar' (calls ros) (Map.insert n reply)

@@ -37,6 +37,7 @@ fakeRos robot =
   Transport
     { address = "the fake robot"
     , refusal = Nothing
+    , newSuffix = pure mempty
     , connecting = \_ received use -> do
         time <- now
         found <- atomically (connect time)

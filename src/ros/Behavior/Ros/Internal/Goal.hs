@@ -230,10 +230,9 @@ start :: Ros -> Action a -> Value -> TVar (Maybe Value) -> STM (Text, Sent)
 start ros which wanted latest = do
   before <- mayRun ros (nameOf which)
   when (before && not (preempts which)) $ throwSTM (StillMoving (Text.unpack (nameOf which)))
-  n <- newNumber ros
+  name <- newId ros "goal"
   connection <- connections <$> readTVar (link ros)
   running <- newSent (nameOf which) connection latest
-  let name = "goal " <> Text.pack (show n)
   ask ros (SendGoal name (nameOf which) (typeOf which) wanted)
   modifyTVar' (sent ros) (Map.insert name running)
   pure (name, running)

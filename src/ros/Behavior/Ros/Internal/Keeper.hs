@@ -73,7 +73,8 @@ withRosWith :: RosOptions -> Transport -> (Ros -> Behavior a) -> Behavior a
 withRosWith options transport behavior = do
   for_ durations (duration "withRosWith" . ($ options))
   traverse_ (throwIO . ErrorCall) (refusal transport)
-  ros <- newRos (address transport) options
+  ending <- newSuffix transport
+  ros <- newRos (address transport) ending options
   servedBy (keeping ros transport) (firstOf [behavior ros, reporting ros] `finally` closing ros)
     `finally` atomically (goDown ros "its withRos has ended" >> modifyTVar' (link ros) (\l -> l {isClosed = True}))
  where

@@ -26,6 +26,7 @@ module Behavior.Ros.Internal.Link
   , inNamespace
   , absolute
   , newNumber
+  , newId
 
     -- * What came
   , Kept (..)
@@ -61,6 +62,8 @@ data Ros = Ros
   { robot :: String
   -- ^ Its address.
   , rosOptions :: RosOptions
+  , suffix :: Text
+  -- ^ What the names of its goals and calls end with.
   , link :: TVar Link
   , outgoing :: TBQueue Request
   -- ^ Empty while the link is down. (So the writer's thread alone writes, and no interruption tears a frame.)
@@ -136,9 +139,9 @@ data Reply
   | NoReply
 
 -- | A link that is down.
-newRos :: String -> RosOptions -> IO Ros
-newRos name options =
-  Ros name options
+newRos :: String -> Text -> RosOptions -> IO Ros
+newRos name ending options =
+  Ros name options ending
     <$> newTVarIO (Link False 0 0 "" "it has not connected yet" False False)
     <*> newTBQueueIO 256 <*> newTBQueueIO 256
     <*> newTVarIO False <*> newTVarIO 0 <*> newTVarIO False
@@ -228,6 +231,10 @@ ask ros request = do
 -- | A number that no other goal, call or receiver has.
 newNumber :: Ros -> STM Int
 newNumber ros = readTVar (nextNumber ros) >>= \n -> n <$ (writeTVar (nextNumber ros) $! n + 1)
+
+-- | A name that no other goal or call has.
+newId :: Ros -> Text -> STM Id
+newId ros what = (\n -> what <> " " <> Text.pack (show n) <> suffix ros) <$> newNumber ros
 
 -- | The topic with this name, subscribed to.
 keptOf :: Ros -> Text -> Text -> Seconds -> STM Kept

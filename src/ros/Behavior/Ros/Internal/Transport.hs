@@ -12,6 +12,7 @@ module Behavior.Ros.Internal.Transport
   ) where
 
 import Data.ByteString.Lazy (ByteString)
+import Data.Text (Text)
 
 import Behavior (Behavior)
 
@@ -23,6 +24,9 @@ data Transport = Transport
   -- ^ For the texts of errors.
   , refusal :: Maybe String
   -- ^ Why this way is never taken, if so.
+  , newSuffix :: IO Text
+  -- ^ What the names of a link's goals and calls end with: another each time. (There are bridges which confuse goals of
+  -- the same name, also those of different clients.)
   , connecting :: forall a. Int -> Behavior () -> (Connection -> Behavior a) -> Behavior a
   -- ^ Connects, and runs the behaviour while it is connected. It is given how many bytes a frame has at most, and
   -- what to call when something was received that is no frame (the answer to a ping).

@@ -14,17 +14,21 @@ import Control.Applicative ((<|>))
 import Control.Concurrent (rtsSupportsBoundThreads)
 import Control.Monad (guard, when)
 import qualified Data.ByteString as Strict
+import qualified Data.ByteString.Base64 as Base64
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Char (isDigit)
 import Data.Foldable (traverse_)
 import Data.IORef
 import Data.List (isPrefixOf, stripPrefix)
+import qualified Data.Text as Text
+import Data.Text.Encoding (decodeLatin1)
 import Network.Socket (Socket)
 import Network.Socket.ByteString (recv)
 import Network.Socket.ByteString.Lazy (sendAll)
 import Network.WebSockets (ConnectionOptions (..), SizeLimit (..), defaultConnectionOptions)
 import qualified Network.WebSockets as Websockets
 import Network.WebSockets.Stream (makeStream)
+import OpenSSL.Random (randBytes)
 import Text.Read (readMaybe)
 
 import Behavior.Ros.Internal.Socket
@@ -75,12 +79,14 @@ toBridge trusted refused url = case parts url of
     Transport
       { address = url
       , refusal = Just ("rosbridge: an address is ws://HOST:PORT or wss://HOST:PORT (and a /PATH), not " ++ show url)
+      , newSuffix = pure mempty
       , connecting = \_ _ _ -> ioError (userError "no address")
       }
   Just (isEncrypted, host, port, path) ->
     Transport
       { address = url
       , refusal = ("rosbridge: " ++) <$> if isEncrypted then needsThreads else refused host
+      , newSuffix = named <$> randBytes 9
       , connecting = \bytes received use ->
           withSocket host port . (if isEncrypted then withTls trusted host else plainly) $ \receive send -> do
             open <- newIORef False
@@ -90,6 +96,7 @@ toBridge trusted refused url = case parts url of
               writeIORef open True >> use (over connection)
       }
  where
+  named bytes = Text.pack " of " <> decodeLatin1 (Base64.encode bytes)
   over connection =
     Connection
       { receiveFrame = Websockets.receiveData connection
