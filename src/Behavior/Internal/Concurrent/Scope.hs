@@ -161,10 +161,14 @@ isDeadlock thrown = defined thrown >>= \e -> pure $ case (fromException e, fromE
 -- the end of that limit.)
 -- A caller that is masked cannot be interrupted here at all: it must not lose the verdict.
 stopAll :: Scope -> MaskingState -> Cause -> Maybe SomeException -> IO (Maybe SomeException, [SomeException])
-stopAll scope state cause before = do
-  newestFirst <- readIORef (branches scope)
-  (thrown, ()) <- interruptibleOnce before (requestStop cause newestFirst)
-  fmap reverse <$> foldM withFault (thrown, []) (reverse newestFirst)
+stopAll scope state cause before =
+  readIORef (branches scope) >>= \case
+    [] -> pure (before, [])
+    newestFirst -> do
+      (thrown, ()) <- interruptibleOnce before (requestStop cause newestFirst)
+      (thrown', faults) <- foldM withFault (thrown, []) (reverse newestFirst)
+      -- (Evaluated: otherwise each operator would allocate a thunk for that.)
+      pure $! (,) thrown' $! reverse faults
  where
   withFault (thrown, faults) (SomeBranch b) = do
     (thrown', o) <-
@@ -250,6 +254,7 @@ requestStopAsync cause these = mask_ $ claimStopRequests these >>= throwToAll (`
 requestStop :: Cause -> [SomeBranch] -> IO ()
 requestStop cause these = mask_ $
   claimStopRequests these >>= \case
+    [] -> pure ()
     [thread] -> throwToOne thread (Stop thread cause)
     threads -> throwToAll (`Stop` cause) threads
 

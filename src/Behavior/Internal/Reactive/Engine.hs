@@ -15,6 +15,7 @@ module Behavior.Internal.Reactive.Engine
 
 import Control.Concurrent.STM (STM, catchSTM, check)
 import Control.Exception (SomeException, throwIO)
+import GHC.Exts (lazy)
 
 import Behavior.Internal.Concurrent.Outcome (Outcome (..), outcomeToIO, result)
 import Behavior.Internal.Concurrent.Scope
@@ -79,8 +80,9 @@ reactNaming naming name expected signal toResponse = do
 -- | Starts the sensors, reads the signal, and does what its value requires.
 startOver :: Eq k => Engine k a -> ReadMode -> IO (Verdict a)
 startOver engine how = do
-  (seen, sensors) <- startSensors (scope engine) (source engine)
-  wakeup <- atomically (readWakeup engine sensors seen (readView how seen))
+  -- (Lazy: otherwise GHC passes the source's fields here, and builds the source again for the engine.)
+  (seen, sensors) <- startSensors (scope engine) (lazy (source engine))
+  wakeup <- atomically (readWakeup engine sensors seen $! readView how seen)
   cause <- decidesOn engine wakeup
   applyResponse engine sensors seen cause wakeup
 
@@ -131,7 +133,7 @@ applyResponse engine sensors seen cause = \case
       tryReadThenBlock (fmap Left <$> tryReadOutcome running) . atomically $
         tryReadOutcomeSTM running >>= maybe (Right <$> awaitChange old) (pure . Left)
     case wakeup of
-      Left end -> pure (endedBy name end)
+      Left end -> pure $! endedBy name end
       Right change -> do
         why <- decidesOn engine change
         interrupt engine sensors why name running change
@@ -146,7 +148,7 @@ interrupt engine sensors cause name running = \case
   Changed _ _ (Conclude _ verdict) -> concluding verdict
   Changed _ _ (RunToEnd recoveryName recovery) ->
     stopBranch sensorBranches >>= \end -> case end of
-      Completed _ -> pure (endedBy name end)
+      Completed _ -> pure $! endedBy name end
       Stopped _ -> forget (scope engine) running >> recover engine sensors cause recoveryName recovery Nothing
       -- A cleanup that threw must not keep the robot from its charger.
       _ -> recover engine sensors cause recoveryName recovery (Just (outcomeToIO end))
@@ -157,11 +159,11 @@ interrupt engine sensors cause name running = \case
         forget (scope engine) running
         (seen, wakeup) <- readAgain
         applyResponse engine sensors seen cause wakeup
-      _ -> pure (endedBy name end)
+      _ -> pure $! endedBy name end
  where
   sensorBranches = map SomeBranch sensors
   concluding verdict =
-    stopBranch sensorBranches >>= \end -> pure $ case end of
+    stopBranch sensorBranches >>= \end -> pure $! case end of
       Stopped _ -> Verdict cause verdict
       _ -> endedBy name end
   -- Waits for the branch, but not for the others.
@@ -172,7 +174,7 @@ interrupt engine sensors cause name running = \case
     end <$ hasStopped (observer engine) (result end)
   readAgain = do
     seen <- atomically (view (source engine))
-    wakeup <- atomically (readWakeup engine sensors seen (reread seen))
+    wakeup <- atomically (readWakeup engine sensors seen $! reread seen)
     case wakeup of
       Changed _ values _ -> rereads (observer engine) values
       SensorDied _ -> pure ()

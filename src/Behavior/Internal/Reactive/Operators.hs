@@ -172,8 +172,9 @@ teleoReactive rules = react "teleoReactive" (map Just [0 .. length rules - 1]) f
   Nothing -> Idle
   Just n -> Run ("rule " ++ show (n + 1)) (snd (rules !! n))
  where
-  firstHolding = findIndex id <$> traverse conditionOf (zip [1 :: Int ..] rules)
-  conditionOf (n, (condition, _)) = suppressEqual (conditionOfRule n condition)
+  firstHolding = dependingOnTrace $ \traced ->
+    findIndex id <$> traverse (suppressEqual . fst) (if traced then zipWith numbered [1 ..] rules else rules)
+  numbered n (condition, behavior) = (conditionOfRule n condition, behavior)
 
 -- | Reads the signal once: the value that it has now, or its first one.
 --

@@ -249,7 +249,7 @@ keeping seen = ignoreErrors seen >>= \a -> Kept a <$> readings seen
 -- (In nested filters, each reads all those inside it, and a change of one wakes the threads of all those around
 -- it: at depth n, n changes wake up to n threads, which read up to n variables.)
 showingKept :: TVar (Maybe (Kept a)) -> View a -> View a
-showingKept variable seen = (mapView (*> (kept <$> value)) seen) {readings = keptReadings <$> value}
+showingKept variable seen = (mapView (*> (kept <$> value)) seen) {namedValues = Just (keptReadings <$> value)}
  where
   value = readTVar variable >>= maybe retry pure
 

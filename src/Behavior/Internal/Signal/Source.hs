@@ -14,6 +14,7 @@ module Behavior.Internal.Signal.Source
   , unlessNamed
   , orNamed
   , openInTrace
+  , dependingOnTrace
   , conditionOfRule
 
     -- * Opening
@@ -26,6 +27,7 @@ module Behavior.Internal.Signal.Source
   , Source (..)
   , fromView
   , View (..)
+  , readings
   , ReadMode (..)
   , readView
   , constantView
@@ -40,6 +42,7 @@ module Behavior.Internal.Signal.Source
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException)
+import Data.Maybe (fromMaybe)
 import Data.Traversable (for)
 
 import Behavior.Internal.Concurrent.Outcome (Outcome (..))
@@ -140,9 +143,9 @@ data View a = View
   -- ^ The first read: retries until there is a value, however long that takes.
   , reread :: !(STM a)
   -- ^ A later read: a value that is missing has been lost.
-  , readings :: STM [Reading]
-  -- ^ The named values that the value is made of, for traces. Read them in a transaction that has
-  -- read the value.
+  , namedValues :: !(Maybe (STM [Reading]))
+  -- ^ What 'readings' gives; nothing if no signal in it has a name. (So views are combined without an action for
+  -- that.)
   }
 
 instance Functor View where
@@ -150,7 +153,17 @@ instance Functor View where
 
 instance Applicative View where
   pure = constantView . pure
-  View f f' these <*> View a a' those = View (f <*> a) (f' <*> a') ((++) <$> these <*> those)
+  View f f' these <*> View a a' those = View (f <*> a) (f' <*> a') (both these those)
+   where
+    both Nothing right = right
+    both left Nothing = left
+    both (Just left) (Just right) = Just ((++) <$> left <*> right)
+
+-- | The named values that the value is made of, for traces. Read them in a transaction that has
+-- read the value.
+readings :: View a -> STM [Reading]
+readings = fromMaybe (pure []) . namedValues
+{-# NOINLINE readings #-}
 
 -- | Whether the operator has had a value before.
 data ReadMode = FirstRead | Reread
@@ -162,7 +175,7 @@ readView Reread = reread
 
 -- | The view whose first and later reads are the same.
 constantView :: STM a -> View a
-constantView value = View value value (pure [])
+constantView value = View value value Nothing
 
 -- | Applies the function to both ways of reading.
 mapView :: (STM a -> STM b) -> View a -> View b
@@ -195,7 +208,7 @@ data Worker = Worker
 watching :: STM a -> Signal a
 watching transaction =
   Signal . const . pure . fromView . pure $
-    View transaction (transaction `orElse` noValueAnyMore) (pure [])
+    View transaction (transaction `orElse` noValueAnyMore) Nothing
  where
   noValueAnyMore = failWith "the signal has no value any more"
 
@@ -244,7 +257,7 @@ conditionOfRule :: Int -> Signal Bool -> Signal Bool
 conditionOfRule n = Signal . openInTrace marked . unlessNamed ("condition " ++ show n)
  where
   marked source = source {view = ofRule <$> view source}
-  ofRule seen = seen {readings = says <$> reread seen <*> readings seen}
+  ofRule seen = seen {namedValues = Just (says <$> reread seen <*> readings seen)}
   says holds = map (\r -> r {readingRule = Just (n, holds)})
 
 -- | Opens the signal; if there is a trace, changes the source. (The operator that opens it is in a trace from its
@@ -256,10 +269,17 @@ openInTrace change signal demand = do
   pure $! if traced then change source else source
 {-# INLINE openInTrace #-}
 
+-- | The signal that the function gives, depending on whether there is a trace. (Where each part of a signal would
+-- be opened by 'openInTrace', that would cost memory for each part, also without a trace.)
+dependingOnTrace :: (Bool -> Signal a) -> Signal a
+dependingOnTrace choose = Signal $ \demand -> isTraced >>= \traced -> open (choose traced) demand
+
 -- | The view whose readings include its value.
 showing :: String -> (a -> String) -> View a -> View a
 showing name render seen =
-  seen {readings = (\before a -> before ++ [Reading name (render a) Nothing]) <$> readings seen <*> reread seen}
+  seen {namedValues = Just (adding <$> readings seen <*> reread seen)}
+ where
+  adding before a = before ++ [Reading name (render a) Nothing]
 
 -- | The threads that run for a source, from left to right.
 type Sensors = [Branch ()]

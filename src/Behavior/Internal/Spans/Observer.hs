@@ -93,7 +93,11 @@ observed Observer {} values = values
 -- the decision is a reaction even if these are its first values. Gives the cause for which it stops its branch.
 decides :: Observer -> Bool -> Values -> IO Cause
 decides Silent _ _ = pure (SignalChanged 0 [])
-decides (Observer here operator cell) always after = do
+decides (Observer here operator cell) always after = decidesObserved here operator cell always after
+{-# INLINE decides #-}
+
+decidesObserved :: Place -> String -> IORef Seen -> Bool -> Values -> IO Cause
+decidesObserved here operator cell always after = do
   seen <- readIORef cell
   if isNothing (lastValues seen) && not always
     then SignalChanged 0 [] <$ writeIORef cell seen {lastValues = Just after}
@@ -113,6 +117,7 @@ decides (Observer here operator cell) always after = do
               }
       writeIORef cell seen {lastValues = Just after, reaction = Just reacted, isReported = False}
       pure (SignalChanged n changes)
+{-# NOINLINE decidesObserved #-}
 
 -- | What the values were before, and are now. (Several signals may have the same name: then the first of them
 -- before belongs to the first of them now, and so on.) Of ordered rules, only the values of conditions that have
@@ -138,7 +143,11 @@ changesBetween before after =
 -- | The branch that the operator was running has stopped, and ended like this.
 hasStopped :: Observer -> Either SomeException a -> IO ()
 hasStopped Silent _ = pure ()
-hasStopped (Observer here _ cell) end = do
+hasStopped (Observer here _ cell) end = hasStoppedObserved here cell end
+{-# INLINE hasStopped #-}
+
+hasStoppedObserved :: Place -> IORef Seen -> Either SomeException a -> IO ()
+hasStoppedObserved here cell end = do
   seen <- readIORef cell
   for_ ((,) <$> reaction seen <*> running seen) $ \(reacted, (name, since)) -> do
     how <- endOf end
@@ -146,6 +155,7 @@ hasStopped (Observer here _ cell) end = do
     let at = reactionTime reacted
         branch = StoppedBranch {stoppedName = name, stoppedAfter = at - since, stoppingTook = t - at, stoppedEnd = how}
     writeIORef cell seen {reaction = Just reacted {reactionStopped = Just branch}}
+{-# NOINLINE hasStoppedObserved #-}
 
 -- | After the stop of a branch the operator has read these values, and does what they require, as part of the same
 -- reaction.
