@@ -63,6 +63,7 @@ outcome :: Either SomeException a -> String
 outcome how = case how of
   Right _ -> "completed"
   Left why
+    | Just (StoppedWithFault _ fault) <- fromException why -> outcome (Left fault :: Either SomeException ())
     | Just name <- failureOrFault why -> name
     | isJust (fromException why :: Maybe SomeAsyncException) -> "stopped"
     | otherwise -> "other"

@@ -219,11 +219,14 @@ whyNotConfirmed ros which = atomically $ do
     Just (Right (Statuses goals))
       | 3 `elem` map snd goals -> "its server says that a goal is being cancelled"
       | all (hasEnded . snd) goals -> "its server says that none of its goals runs"
-      | otherwise -> "its server says that a goal runs, and is not being cancelled"
+      | otherwise ->
+          "its server says that a goal runs, and is not being cancelled: it has refused the cancel, or the bridge has"
+            ++ " not passed it on (" ++ fault909 ++ ")"
     Just (Left why) -> why
     Nothing ->
-      "nothing is known of its server: it is not there, or the bridge has not answered since. Bridges with the fault"
-        ++ " 909 of rosbridge_suite work on a cancel only when the goal has ended"
+      "nothing is known of its server: it is not there, or the bridge has not answered since (" ++ fault909 ++ ")"
+ where
+  fault909 = "bridges with the fault 909 of rosbridge_suite work on a cancel only when the goal has ended"
 
 -- | Registers the goal, and hands it to the writer.
 start :: Ros -> Action a -> Value -> TVar (Maybe Value) -> STM (Text, Sent)
