@@ -47,6 +47,10 @@ spec = guarded . describe "agreeing" $ do
       found <- timed (agreeing m agree [sleep n >> pure v | (n, v) <- zip [1 ..] values])
       pure (found === defined m agree values)
 
+  it "gives no results of which two do not agree" $ do
+    let near a b = abs (a - b) <= (1 :: Int)
+    ending (agreeing 3 near (map pure [1, 2, 3])) `shouldReturn` FailedWith "FailedBecause \"no 3 of 3 agree\""
+
   it "starts nothing when the answer is certain" $ do
     entries <- newLog
     let sensor = note entries 'a'

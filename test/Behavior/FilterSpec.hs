@@ -17,7 +17,7 @@ import Behavior (Seconds, (|||))
 import Behavior.Internal.Seam.Runtime (atomically, now, sleep)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (Run (finished), explore, randomly, simulate)
+import Behavior.Sim (Run (finished, outcome), explain, explore, randomly, simulate)
 import Support
 import Watched
 
@@ -166,6 +166,13 @@ debounce = do
       -- The accepted value had lasted, from just before it was set until the next one was
       -- read. (Which value that is depends on the machine.)
       phases `shouldSatisfy` any (\(v, from, to) -> v == value && min to accepted - from >= 0.002)
+
+  it "accepts no value that was another one meanwhile" $ do
+    run <- simulate $ do
+      level <- newTVarIO False
+      let changes = for_ [1, 0.6, 0.2] $ \pause -> sleep pause >> atomically (modifyTVar' level not)
+      (changes >> hang) ||| Signal.waitUntil (Signal.debounce 1 (watchedVar level))
+    (explain (outcome run), finished run) `shouldBe` ("it returned", 2.8)
 
   it "accepts at once the first value after a recovery" $ do
     condition <- newTestCondition True
