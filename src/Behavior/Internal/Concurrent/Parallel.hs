@@ -61,6 +61,8 @@ import Behavior.Internal.Seam.Runtime (atomically, tryReadThenBlock)
 --
 -- @since 0.1.0.0
 parallel :: Behavior a -> Behavior b -> Behavior ()
+-- ('firstOf' of the two would do, with other names for its branches. Two outcomes can be read as they are, without the
+-- variable that says which of many came first.)
 parallel left right = structured "parallel" $ \scope -> do
   l <- branch scope "left" (void left)
   r <- branch scope "right" (void right)
