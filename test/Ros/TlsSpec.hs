@@ -45,16 +45,17 @@ encrypted = beforeAll (withOpenSSL (generateRSAKey' 2048 65537)) $ do
       over (tlsServer key file) (trusting file) patient $ \_ ros -> carrying ros "cup" >>= (`shouldBe` "a cup")
   it "does not come up with a certificate that the system does not trust" $ \key ->
     withCertificate key "127.0.0.1" $ \file ->
-      refusedBy (tlsServer key file) (\port -> rosbridge ("wss://127.0.0.1:" ++ port)) "certificate verify failed"
+      refusedBy (tlsServer key file) (\port -> rosbridge ("wss://127.0.0.1:" ++ port)) unproved
   it "does not come up with a certificate that names another host" $ \key ->
     withCertificate key "elsewhere" $ \file ->
-      refusedBy (tlsServer key file) (trusting file) "certificate verify failed"
+      refusedBy (tlsServer key file) (trusting file) unproved
   it "does not come up with a bridge that does not encrypt" $ \_ ->
     refusedBy plainly (\port -> rosbridge ("wss://127.0.0.1:" ++ port)) ""
   it "is required where there are certificates" $ \_ ->
     withRos (rosbridgeTrusting "robot.pem" "ws://localhost:9090") (\_ -> pure ())
       `shouldThrow` errorCall "rosbridge: certificates are for wss://HOST:PORT or wss://HOST:PORT/PATH"
  where
+  unproved = "no certificate that is trusted proves that it is 127.0.0.1"
   trusting file port = rosbridgeTrusting file ("wss://127.0.0.1:" ++ port)
   refusedBy server way why =
     over server way patient {noServerAfter = 0.1} $ \robot ros -> do

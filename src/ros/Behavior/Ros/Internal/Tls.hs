@@ -8,7 +8,7 @@ module Behavior.Ros.Internal.Tls
   ( withTls
   ) where
 
-import Control.Exception (SomeException, try)
+import Control.Exception (SomeException, catch, throwIO, toException, try)
 import Control.Monad (void)
 import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Lazy as Lazy
@@ -29,9 +29,14 @@ withTls trusted host use socket = withOpenSSL $ do
   connection <- Tls.connection context socket
   Tls.setTlsextHostName connection host
   Tls.enableHostnameValidation connection host
-  Tls.connect connection
+  Tls.connect connection `catch` refused connection
   use (Tls.read connection 32768) (maybe (goodbye connection) (Tls.lazyWrite connection))
  where
+  -- (OpenSSL's own text can be that of another connection.)
+  refused connection e = do
+    isProved <- Tls.getVerifyResult connection
+    throwIO (if isProved then toException (e :: Tls.SomeSSLException) else toException notProved)
+  notProved = userError ("no certificate that is trusted proves that it is " ++ host)
   goodbye connection = void (try (Tls.shutdown connection Tls.Unidirectional) :: IO (Either SomeException ()))
 
 -- | What checks certificates.
