@@ -60,7 +60,7 @@ class (RosMessage (Question a), RosMessage (Answer a)) => RosService a where
   -- | What it answers: the response.
   type Answer a
 
-  -- | The typeNames name. (If it is empty, the bridge takes the one that the service has.)
+  -- | The type's name. (If it is empty, the bridge takes the one that the service has.)
   serviceType :: Proxy a -> Text
 
 -- | A service without a type of its own: see 'untypedService'.

@@ -76,7 +76,7 @@ class (RosMessage (Goal a), RosMessage (Result a), RosMessage (Feedback a)) => R
   -- | What is known meanwhile.
   type Feedback a
 
-  -- | The typeNames name.
+  -- | The type's name.
   actionType :: Proxy a -> Text
 
 -- | An action without a type of its own: see 'untyped'.

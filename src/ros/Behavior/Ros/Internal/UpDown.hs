@@ -37,7 +37,7 @@ comeUp ros time = do
   for_ before $ \known -> do
     writeTVar (isAbsent known) False
     modifyTVar' (arrivedBy known) (min (time + patience (rosOptions ros)))
-  let moving = nub (map sentTo before)
+  let moving = [action | action <- nub (map sentTo before), statusOf action `Map.notMember` topics]
   pure $
     [Advertise name typeName keeps | (name, Advertised typeName keeps _) <- Map.toList topicsOfOurs]
       ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
