@@ -136,23 +136,14 @@ spec = guarded $ do
       let act = inSeconds 10.5 (tried (stopAfter 10 (carrying ros "cup")))
       lost <- firstOf [sleep 10.5 >> loseLink robot >> sleepForever, act]
       lost `shouldBe` Left linkLost
-    it "a goal that its server accepts after a new connection is not taken for an ended one" . underSchedules 40 $ do
-      let slowToAccept = succeeding {acceptedAfter = 1.5, endsAfter = 8}
-      -- (The server has accepted one before, so that it has a status.)
-      mission (named [("first", succeeding), ("cup", slowToAccept)]) $ \robot ros -> do
-        void (carrying ros "first")
-        let losing = sleep 0.1 >> loseLink robot >> sleep 0.3 >> restoreLink robot >> sleepForever
-        _ <- firstOf [losing, tried (carrying ros "cup") <* awaitUp ros]
+    it "a goal that its server accepts after a new connection is not taken for an ended one" . underSchedules 40 $
+      lostBeforeItIsAccepted $ \robot ros -> do
         sleep 0.5
         try (carrying ros "pot") >>= (`shouldBe` Left (StillMoving "/carry"))
         Signal.waitUntil ((== 0) <$> movingGoals ros)
         atomically (runningGoals robot) >>= (`shouldBe` [])
-    it "a goal is not taken for an ended one by what was said before the link froze" . underSchedules 40 $ do
-      let slowToAccept = succeeding {acceptedAfter = 1.5, endsAfter = 8}
-      mission (named [("first", succeeding), ("cup", slowToAccept)]) $ \robot ros -> do
-        void (carrying ros "first")
-        let losing = sleep 0.1 >> loseLink robot >> sleep 0.3 >> restoreLink robot >> sleepForever
-        _ <- firstOf [losing, tried (carrying ros "cup") <* awaitUp ros]
+    it "a goal is not taken for an ended one by what was said before the link froze" . underSchedules 40 $
+      lostBeforeItIsAccepted $ \robot ros -> do
         sleep 0.5 >> freezeLink robot >> sleep 2
         Signal.read (movingGoals ros) >>= (`shouldBe` 1)
     it "the robot is asked again whether the old goal runs, if a new bridge has not said" . underSchedules 40 $
@@ -203,6 +194,16 @@ instance RosAction Counting where
   type Result Counting = Double
   type Feedback Counting = Double
   actionType _ = "my_robot/action/Count"
+
+-- | A goal whose link is lost 1.4 s before its server accepts it, and is there again. (The server has accepted one
+-- before, so that it has a status.)
+lostBeforeItIsAccepted :: (FakeRobot -> Ros -> Behavior a) -> Behavior a
+lostBeforeItIsAccepted act =
+  mission (named [("first", succeeding), ("cup", succeeding {acceptedAfter = 1.5, endsAfter = 8})]) $ \robot ros -> do
+    void (carrying ros "first")
+    let losing = sleep 0.1 >> loseLink robot >> sleep 0.3 >> restoreLink robot >> sleepForever
+    _ <- firstOf [losing, tried (carrying ros "cup") <* awaitUp ros]
+    act robot ros
 
 -- | Takes a minute, and does not stop.
 stubborn :: GoalScript
