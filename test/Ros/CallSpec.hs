@@ -11,6 +11,7 @@ import Control.Monad (void)
 import Data.Aeson (Value (..), object, (.=))
 import qualified Data.Map.Strict as Map
 import Data.Text (Text)
+import qualified Data.Text as Text
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -152,7 +153,22 @@ spec = guarded $ do
     it "of a server that is not there fails" . underSchedules 40 . mission (const slowly) $ \_ ros ->
       try (stopAll ros (untyped "/fly" ""))
         >>= (`shouldBe` Left (ServiceFailed "/fly/_action/cancel_goal" "there is no such service"))
-    it "when none runs returns" . underSchedules 40 . mission (const slowly) $ \_ ros -> inSeconds 0 (stopAll ros carry)
+    it "returns when none runs: if there never was one, after its patience" . withNamed brief $ \_ ros -> do
+      inSeconds 2 (stopAll ros carry)
+      void (carrying ros "cup")
+      inSeconds 0 (stopAll ros carry)
+    it "clears those left behind that have ended: here the result was too large" . withNamed large $ \_ ros -> do
+      tried (stopAfter 5 (carrying ros "table")) >>= (`shouldBe` Left (NotConfirmed "/carry" noneRuns))
+      try (carrying ros "cup") >>= (`shouldBe` Left (StillMoving "/carry"))
+      stopAll ros carry
+      void (carrying ros "cup")
+    it "does not clear what may not have come yet" . withNamed late $ \robot ros -> do
+      void (carrying ros "cup")
+      let breaks = sleep 0.1 >> loseLink robot >> sleep 0.1 >> restoreLink robot
+      void (tried (carrying ros "table")) `both` breaks
+      Signal.waitUntil (linkUp ros)
+      stopAll ros carry
+      Signal.read (movingGoals ros) >>= (`shouldBe` 1)
 
   describe "A namespace" $
     it "is that of relative names, and nests" . withRobot $ \robot ros -> do
@@ -168,6 +184,12 @@ spec = guarded $ do
   lights = untypedService "/lights" "std_srvs/srv/SetBool"
   speeds = publication "/speed" :: Publication (Std (Maybe Double))
   unconfirmed = NotConfirmed "/carry" "its server has not said that they have ended"
+  noneRuns = "its server says that none of its goals runs"
+  brief = []
+  large = [("table", succeeding {endsWith = Succeeds (String (Text.replicate 5000 "x"))})]
+  late = [("table", succeeding {acceptedAfter = 1})]
+  withNamed scripts = underSchedules 40 . missionWith small (named scripts)
+  small = defaultRosOptions {frameBytes = 4000, pingEvery = 10}
   deaf = slowly {confirmsAfter = 1 / 0}
   withService script act = underSchedules 40 . onRobot $ \robot ros ->
     offerService robot "/lights" script >> act robot ros

@@ -1,3 +1,4 @@
+{-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE OverloadedStrings #-}
 
 -- |
@@ -11,7 +12,7 @@ module Ros.Cases
   , servers
   ) where
 
-import Control.Exception (SomeException)
+import Control.Exception (SomeException, throwIO)
 import Control.Monad (void)
 import Data.Aeson (Value (..), object, (.=))
 import Data.Maybe (fromMaybe)
@@ -23,6 +24,7 @@ import Behavior.Ros.Action
 import Behavior.Ros.Fake
 import Behavior.STM
 import qualified Behavior.Signal as Signal
+import Behavior.Time (now)
 import Ros.Stage (failureOrFault, fibonacci, patient)
 
 -- | A link to the robot, and what cuts it and mends it.
@@ -92,6 +94,16 @@ cases =
           sequence [pure end, mayRun host]
       )
       ["CancelledByOther", "0"]
+  , Case "all goals of a server are stopped, and one of them does not stop"
+      ( \host -> do
+          begun <- now
+          end <- interruptedAtWork host "/stubborn" good
+          stopAllAtLast host "/stubborn"
+          -- (The goal takes at least three seconds.)
+          hasEnded <- (>= begun + 3) <$> now
+          ([end, show hasEnded] ++) <$> sequence [mayRun host]
+      )
+      ["NotConfirmed", "True", "0"]
   , Case "a link that is lost, and is there again"
       ( \host -> do
           end <- ended (working host "/steady" good (cut host))
@@ -132,6 +144,13 @@ interruptedAtOnce host name order =
     [ void (goal (to host) (fibonacci name) (wanted order))
     , Signal.waitUntil ((> 0) <$> movingGoals (to host))
     ]
+
+-- | Again and again, until its server says that none runs.
+stopAllAtLast :: Host -> String -> Behavior ()
+stopAllAtLast host name =
+  tryAny (stopAll (to host) (fibonacci name)) >>= \case
+    Left e | how e == "NotConfirmed" -> stopAllAtLast host name
+    end -> either throwIO pure end
 
 done :: Behavior () -> Behavior String
 done act = either how (const "done") <$> tryAny act

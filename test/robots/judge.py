@@ -415,7 +415,7 @@ def row_15():
 
 def row_16():
     cases = [e for e in believed[16] if "case" in e]
-    all_of(16, "cases that end as with fake robots", (e for e in cases if e["gave"] == e["expected"]), cases, 11)
+    all_of(16, "cases that end as with fake robots", (e for e in cases if e["gave"] == e["expected"]), cases, 12)
     for case in cases:
         if case["gave"] != case["expected"]:
             print(f"    {case}")

@@ -103,7 +103,8 @@ obey robot it time frame = case decodeRequest limits frame of
     case Text.stripSuffix "/_action/cancel_goal" name of
       Just actionName | Map.member actionName (scripts robot) -> do
         found <- filter ((== actionName) . action) . Map.elems <$> readTVar (goals robot)
-        can <- filterM (cancel time) found
+        -- (Those that are being cancelled already are not among those that it can cancel.)
+        can <- filterM (fmap not . readTVar . cancelWanted) found >>= filterM (cancel time)
         answer it (Response n True (toRos (Cancelling 0 (map (goalId . number) can))))
       _ ->
         readTVar (services robot) >>= \known -> case Map.lookup name known of

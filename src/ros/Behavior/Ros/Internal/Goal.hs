@@ -136,9 +136,9 @@ replacing which = which {preempts = True}
 --
 -- With 'NotConfirmed' and 'LinkLost' /the robot may still move/ when the operator goes on: so a
 -- 'Behavior.Signal.monitor' may start its recovery while it does. Such goals are counted ('Behavior.Ros.movingGoals')
--- until the server says that they have ended: after a new connection, that it has no goal left, and that not before
--- 'Behavior.Ros.patience' (it may not have accepted the goal yet). Until then a new goal on that action is refused
--- with 'StillMoving'.
+-- until the server says that they have ended: by the goal's result; to 'Behavior.Ros.Action.stopAll'; or, after a new
+-- connection, that it has no goal left, and that not before 'Behavior.Ros.patience' (it may not have accepted the goal
+-- yet). Until then a new goal on that action is refused with 'StillMoving'.
 --
 -- >>> let carry = untyped "/carry" "my_robot/action/Carry"
 -- >>> let server _ = succeeding {endsAfter = 60, confirmsAfter = 0.5}
@@ -192,10 +192,9 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ do
     (n, running) <- handOver ros restore (start ros which message latest)
     try (restore (atomically (awaitEnd running))) >>= \case
       Right how -> atomically (conclude how)
-      Left stop -> confirmation ros which n running >>= maybe unconfirmed (afterStop stop)
+      Left stop -> confirmation ros which n running >>= afterStop stop
  where
   name = Text.unpack (nameOf which)
-  unconfirmed = whyNotConfirmed ros which >>= throwIO . NotConfirmed name
   conclude how = case how of
     Ended 4 values -> expected which values
     Ended 5 _ -> throwSTM (CancelledByOther name)
@@ -205,14 +204,15 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ do
     Ended _ values -> throwSTM (Rejected name (textOf values))
     Complained why -> throwSTM (Rejected name (Text.unpack why))
     Lost -> readTVar (link ros) >>= throwSTM . LinkLost (robot ros) . whyLost
+    Unconfirmed -> whyNotConfirmed ros which >>= throwSTM . NotConfirmed name
   -- (Also if it has succeeded: if the stop ended here, what comes after the goal would run.)
-  afterStop stop how = case how of
-    Lost -> atomically (conclude how)
-    _ -> throwIO (stop :: SomeException)
+  afterStop stop how
+    | mayStillRun how = atomically (conclude how)
+    | otherwise = throwIO (stop :: SomeException)
 
 -- | What is known of a server that does not confirm.
-whyNotConfirmed :: Ros -> Action a -> Behavior String
-whyNotConfirmed ros which = atomically $ do
+whyNotConfirmed :: Ros -> Action a -> STM String
+whyNotConfirmed ros which = do
   known <- Map.lookup (statusOf (nameOf which)) <$> readTVar (kept ros)
   said <- maybe (pure Nothing) (readTVar . newest) known
   pure $ case decoded . arrived <$> said of
@@ -241,10 +241,11 @@ start ros which wanted latest = do
   pure (name, running)
 
 -- | Cancels the goal, again and again, until it has ended or the patience has. One that was not sent yet is withdrawn.
-confirmation :: Ros -> Action a -> Text -> Sent -> Behavior (Maybe SentEnd)
+confirmation :: Ros -> Action a -> Text -> Sent -> Behavior SentEnd
 confirmation ros which n running = do
   begun <- now
-  cleanupWithin limit (askEvery begun ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
+  _ <- cleanupWithin limit (askEvery begun ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
+  atomically ((running `endWith` Unconfirmed) >> awaitEnd running)
  where
   limit = patience (rosOptions ros)
   askEvery begun pauses = do

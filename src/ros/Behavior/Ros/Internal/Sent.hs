@@ -8,6 +8,7 @@ module Behavior.Ros.Internal.Sent
   ( Sent (..)
   , newSent
   , SentEnd (..)
+  , mayStillRun
   , endWith
   , setOnce
   ) where
@@ -48,7 +49,17 @@ newSent action connection latest =
 data SentEnd
   = Ended !Int Value
   | Complained Text
-  | Lost
+  | -- | Its link was lost.
+    Lost
+  | -- | Its server has not confirmed in time that it has stopped.
+    Unconfirmed
+
+-- | Whether the goal may still run on the robot, although nothing waits for it.
+mayStillRun :: SentEnd -> Bool
+mayStillRun how = case how of
+  Lost -> True
+  Unconfirmed -> True
+  _ -> False
 
 -- | Ends the goal, unless it has ended.
 endWith :: Sent -> SentEnd -> STM ()

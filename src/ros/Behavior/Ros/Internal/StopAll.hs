@@ -11,22 +11,30 @@ module Behavior.Ros.Internal.StopAll
   , Cancelling (..)
   ) where
 
+import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (throwIO)
 import Control.Monad (unless, when)
 import Data.Aeson (Value, object, withObject, (.=))
+import qualified Data.Map.Strict as Map
+import Data.Maybe (isNothing)
+import Data.Set (Set)
+import Data.Text (Text)
 import qualified Data.Text as Text
 
-import Behavior (Behavior, (?))
+import Behavior (Behavior, Seconds, (?))
 import Behavior.Ros.Internal.Call
 import Behavior.Ros.Internal.Error
+import Behavior.Ros.Internal.Frame (Id)
 import Behavior.Ros.Internal.Goal
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
 import Behavior.Ros.Internal.Options
+import Behavior.Ros.Internal.Sent
 import Behavior.Ros.Internal.Status
 import Behavior.Ros.Internal.Topic
+import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (timeout)
+import Behavior.Time (now, timeout)
 import Behavior.Trace (named)
 
 -- $setup
@@ -40,9 +48,11 @@ import Behavior.Trace (named)
 
 -- | Cancels /all/ goals of the action's server, also those of other programs, and waits until the server says that they
 -- have ended. No operator does this: it is for an emergency, or for goals that were left behind ('NotConfirmed',
--- 'LinkLost', or a program that has crashed).
+-- 'LinkLost', or a program that has crashed). Of ours, those no longer count as such that may still run.
 --
--- [Result] Nothing runs that ran when it was called.
+-- [Result] Nothing runs that ran when the server was asked, also what it does not cancel, or was cancelling before.
+--   (A server says nothing of its goals until it has had one. So if it cancels none, and says nothing, this takes
+--   'Behavior.Ros.patience'.)
 -- [Failure] 'ServiceFailed', if the server does not cancel them, or is not there; 'TooSlow', 'NoServer' as
 --   'Behavior.Ros.call'.
 -- [Fault] 'NotConfirmed', if the server does not say within 'Behavior.Ros.patience' that they have ended: the robot may
@@ -62,17 +72,40 @@ import Behavior.Trace (named)
 stopAll :: Ros -> Action a -> Behavior ()
 stopAll ros which = named ("stop all goals: " ++ name) $ do
   -- (Subscribed to before the call: no change is missed.)
-  _ <- subscribed ros statuses
+  known <- subscribed ros statuses
+  left <- now >>= atomically . leftBehind ros (nameIn ros which)
   Cancelling how goals <- call ros (service (name ++ "/_action/cancel_goal") :: Service CancelGoal) ()
   when (how == rejected) $ throwIO (ServiceFailed name "it does not cancel them")
-  unless (null goals) $
-    timeout (patience (rosOptions ros)) (Signal.waitUntil (endOf goals <$> latest ros statuses))
-      ? throwIO (NotConfirmed name "its server has not said that they have ended")
+  timeout (patience (rosOptions ros)) (untilEnded goals) ? do
+    saidNothing <- isNothing <$> readTVarIO (newest known)
+    unless (saidNothing && null goals) $ throwIO (NotConfirmed name "its server has not said that they have ended")
+  atomically (modifyTVar' (sent ros) (`Map.withoutKeys` left))
  where
   name = Text.unpack (nameIn ros which)
   statuses = topic (Text.unpack (statusOf (nameIn ros which))) latched :: Topic Statuses
   rejected = 1
-  endOf goals (Statuses known) = and [maybe False hasEnded (lookup g known) | g <- goals]
+  -- (A server names only those that it begins to cancel now. What else runs is in what it says of all goals.)
+  untilEnded goals = do
+    Statuses before <- Signal.read (latest ros statuses)
+    let running = [g | (g, status) <- before, not (hasEnded status)]
+        -- (It has forgotten what it no longer names.)
+        isOver known g = maybe (g `elem` running) hasEnded (lookup g known)
+    Signal.waitUntil ((\(Statuses known) -> all (isOver known) (goals ++ running)) <$> latest ros statuses)
+
+-- | Our goals on that action that may still run although nothing waits for them, and that have come to their server, or
+-- never will.
+leftBehind :: Ros -> Text -> Seconds -> STM (Set Id)
+leftBehind ros name time = do
+  ours <- Map.filter ((== name) . sentTo) <$> readTVar (sent ros)
+  Map.keysSet . Map.filter id <$> traverse isLeft ours
+ where
+  isLeft one = do
+    how <- readTVar (end one)
+    by <- readTVar (arrivedBy one)
+    pure $ case how of
+      Just Unconfirmed -> True
+      Just Lost -> by <= time
+      _ -> False
 
 -- | action_msgs/srv/CancelGoal. (An empty request is about all goals.)
 data CancelGoal
