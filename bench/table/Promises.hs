@@ -26,10 +26,10 @@ trying =
 together =
   operators
     "Two at once: nanoseconds"
-    [ "parallel, both end at once" `within` 1.4 `times` "race, both end at once"
-    , "parallel, one to be stopped" `within` 1.4 `times` "race, one to be stopped"
-    , "both, both end at once" `within` 1.6 `times` "concurrently_, both end at once"
-    , "both, one to be stopped" `within` 1.6 `times` "concurrently_, one to be stopped"
+    [ "parallel, both end at once" `within` 1.15 `times` "race, both end at once"
+    , "parallel, one to be stopped" `within` 1.2 `times` "race, one to be stopped"
+    , "both, both end at once" `within` 1.3 `times` "concurrently_, both end at once"
+    , "both, one to be stopped" `within` 1.3 `times` "concurrently_, one to be stopped"
     ]
 reacting =
   operators
@@ -37,7 +37,7 @@ reacting =
     [ "monitor, uninterrupted" `within` 1.4 `times` "race, both end at once"
     , "rSelect, uninterrupted" `within` 1.4 `times` "race, both end at once"
     , "monitor, polled" `within` 2.5 `times` "race, both end at once"
-    , "interruption, recovery and restart" `within` 1.5 `times` scaled 2 "race, one to be stopped"
+    , "interruption, recovery and restart" `within` 1.3 `times` scaled 2 "race, one to be stopped"
     ]
 manyBranches =
   operators "Many at once, compared with n/2 times the cost for 2: nanoseconds" $
