@@ -1,12 +1,13 @@
 {-# LANGUAGE LambdaCase #-}
 {-# LANGUAGE OverloadedStrings #-}
 {-# LANGUAGE ScopedTypeVariables #-}
+{-# LANGUAGE TypeFamilies #-}
 
 -- |
 -- What a program asks of a robot besides goals: services, parameters, publishing, and stopping everything.
 module Ros.CallSpec (spec) where
 
-import Control.Exception (ArithException (..), ErrorCall (..), throw, try)
+import Control.Exception (ArithException (..), ErrorCall (..), MaskingState (Unmasked), throw, try)
 import Control.Monad (void)
 import Data.Aeson (Value (..), object, (.=))
 import qualified Data.Map.Strict as Map
@@ -52,6 +53,8 @@ spec = guarded $ do
       case end of
         Left (Undecodable "/arm/get_parameters" _) -> pure ()
         _ -> expectationFailure (show end)
+    it "reads its answer where an interruption can end that" . withService (answering 0) $ \_ ros ->
+      call ros (service "/lights" :: Service Reading) Null >>= (`shouldBe` Masked Unmasked)
     it "faults at once when the link is lost" . withService (answering 3) $ \robot ros -> do
       end <- firstOf [sleep 1 >> loseLink robot >> sleepForever, inSeconds 1 (try (call ros lights Null))]
       end `shouldBe` Left (LinkLost "the fake robot" "user error (connection lost)")
@@ -211,3 +214,11 @@ spec = guarded $ do
   errorOf act = either (\(ErrorCall text) -> text) (const "it returned") <$> try act
   tried :: Behavior a -> Behavior (Either RosFault a)
   tried = try
+
+-- | A service whose answers say how they were read.
+data Reading
+
+instance RosService Reading where
+  type Question Reading = Value
+  type Answer Reading = Masked
+  serviceType _ = "std_srvs/srv/SetBool"

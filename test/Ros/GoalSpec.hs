@@ -5,7 +5,7 @@
 -- Goals of a robot that is at the other end of a link.
 module Ros.GoalSpec (spec) where
 
-import Control.Exception (finally, throwIO, try)
+import Control.Exception (MaskingState (Unmasked), finally, throwIO, try)
 import Control.Monad (void)
 import Data.Aeson (Value (..), object, (.=))
 import Data.IORef
@@ -39,6 +39,9 @@ spec = guarded $ do
     it "faults if its result is not what is expected" . underSchedules 40 . mission (const succeeding) $ \_ ros ->
       tried (goal ros (action "/carry" :: Action Counting) 3)
         >>= (`shouldBe` Left (Undecodable "/carry" "Error in $: this is no number"))
+    it "reads its result where an interruption can end that" . underSchedules 40 . mission (const succeeding) $
+      \_ ros ->
+        goal ros (action "/carry" :: Action Reading) Null >>= (`shouldBe` Masked Unmasked)
     it "fails when there is no link in time" . underSchedules 40 . mission (const succeeding) $ \robot ros -> do
       awaitUp ros
       loseLink robot
@@ -194,6 +197,15 @@ instance RosAction Counting where
   type Result Counting = Double
   type Feedback Counting = Double
   actionType _ = "my_robot/action/Count"
+
+-- | An action whose results say how they were read.
+data Reading
+
+instance RosAction Reading where
+  type Goal Reading = Value
+  type Result Reading = Masked
+  type Feedback Reading = Value
+  actionType _ = "my_robot/action/Carry"
 
 -- | A goal whose link is lost 1.4 s before its server accepts it, and is there again. (The server has accepted one
 -- before, so that it has a status.)

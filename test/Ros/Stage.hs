@@ -16,17 +16,20 @@ module Ros.Stage
   , patient
   , named
   , inSeconds
+  , Masked (..)
   ) where
 
-import Control.Exception (SomeException, fromException, throwIO)
+import Control.Exception (MaskingState, SomeException, fromException, getMaskingState, throwIO)
 import Control.Monad (void)
 import Data.Aeson (Value (..))
 import Data.Text (Text)
+import System.IO.Unsafe (unsafePerformIO)
 
 import Behavior
 import Behavior.Ros
 import Behavior.Ros.Action
 import Behavior.Ros.Fake
+import Behavior.Ros.Messages
 import Behavior.Sim
 import Behavior.Time (now, timeout)
 
@@ -97,3 +100,11 @@ inSeconds expected act = do
   if abs (took - expected) < 0.001
     then either throwIO pure a
     else fail ("it took " ++ show took ++ " s, not " ++ show expected ++ ": " ++ either show (const "it returned") a)
+
+-- | What the thread that reads it holds back: it must be nothing, or no interruption ends a reader that does not end.
+newtype Masked = Masked MaskingState
+  deriving (Eq, Show)
+
+instance RosMessage Masked where
+  fromRos value = pure $! Masked (unsafePerformIO (value `seq` getMaskingState))
+  toRos _ = Null

@@ -191,12 +191,13 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ do
     -- (It is registered and handed over in one transaction: no interruption comes between.)
     (n, running) <- handOver ros restore (start ros which message latest)
     try (restore (atomically (awaitEnd running))) >>= \case
+      -- (An interruption ends also a user's decoder that does not end.)
+      Right (Ended 4 values) -> restore (atomically (expected which values))
       Right how -> atomically (conclude how)
       Left stop -> confirmation ros which n running >>= afterStop stop
  where
   name = Text.unpack (nameOf which)
   conclude how = case how of
-    Ended 4 values -> expected which values
     Ended 5 _ -> throwSTM (CancelledByOther name)
     -- (An action's result is an object. Text is the bridge's, when the goal was not accepted.)
     Ended 6 (String why) -> throwSTM (Rejected name (Text.unpack why))
