@@ -20,9 +20,10 @@ import Behavior.Parallel (allOf, firstOf)
 import Behavior.Ros
 import Behavior.Ros.Action
 import Behavior.Ros.Fake
-import Behavior.Ros.Internal.Frame (Answer (..))
+import Behavior.Ros.Internal.Frame (Answer (..), encodeAnswer)
 import Behavior.Ros.Internal.Link (Reply (..), Ros (calls), newRos)
 import qualified Behavior.Ros.Internal.Receive as Receive
+import Behavior.Ros.Internal.Status (Statuses (..))
 import Behavior.Ros.Internal.UpDown (comeUp, goDown)
 import Behavior.Ros.Messages
 import Behavior.STM
@@ -165,6 +166,17 @@ spec = guarded $ do
       try (carrying ros "cup") >>= (`shouldBe` Left (StillMoving "/carry"))
       stopAll ros carry
       void (carrying ros "cup")
+    it "returns if the server has crashed, and is there again: what it has said before does not count" $
+      withNamed brief $ \robot ros -> do
+        stopAll ros carry
+        robot `hasSaid` [("one", 2)]
+        inSeconds 2 (stopAll ros carry)
+        void (carrying ros "cup")
+    it "asks the server what runs: what comes late does not count" . underSchedules 40 . mission (const deaf) $
+      \robot ros -> do
+        void (tried (stopAfter 5 (carrying ros "cup")))
+        robot `hasSaid` []
+        tried (inSeconds 2 (stopAll ros carry)) >>= (`shouldBe` Left unconfirmed)
     it "does not clear what may not have come yet" . withNamed late $ \robot ros -> do
       void (carrying ros "cup")
       let breaks = sleep 0.1 >> loseLink robot >> sleep 0.1 >> restoreLink robot
@@ -188,6 +200,10 @@ spec = guarded $ do
   speeds = publication "/speed" :: Publication (Std (Maybe Double))
   unconfirmed = NotConfirmed "/carry" "its server has not said that they have ended"
   noneRuns = "its server says that none of its goals runs"
+  -- (As a new subscriber does not receive it.)
+  robot `hasSaid` goals = do
+    sendBytes robot (encodeAnswer (Message "/carry/_action/status" (toRos (Statuses goals))))
+    sleep 0.1
   brief = []
   large = [("table", succeeding {endsWith = Succeeds (String (Text.replicate 5000 "x"))})]
   late = [("table", succeeding {acceptedAfter = 1})]

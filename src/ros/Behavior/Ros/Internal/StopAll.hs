@@ -15,8 +15,9 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (throwIO)
 import Control.Monad (unless, when)
 import Data.Aeson (Value, object, withObject, (.=))
+import Data.Foldable (traverse_)
 import qualified Data.Map.Strict as Map
-import Data.Maybe (isNothing)
+import Data.Maybe (isJust)
 import Data.Set (Set)
 import Data.Text (Text)
 import qualified Data.Text as Text
@@ -24,7 +25,7 @@ import qualified Data.Text as Text
 import Behavior (Behavior, Seconds, (?))
 import Behavior.Ros.Internal.Call
 import Behavior.Ros.Internal.Error
-import Behavior.Ros.Internal.Frame (Id)
+import Behavior.Ros.Internal.Frame (Id, Request (..))
 import Behavior.Ros.Internal.Goal
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
@@ -51,8 +52,8 @@ import Behavior.Trace (named)
 -- 'LinkLost', or a program that has crashed). Of ours, those no longer count as such that may still run.
 --
 -- [Result] Nothing runs that ran when the server was asked, also what it does not cancel, or was cancelling before.
---   (A server says nothing of its goals until it has had one. So if it cancels none, and says nothing, this takes
---   'Behavior.Ros.patience'.)
+--   (A server says nothing of its goals until it has had one, also one that has crashed and is there again. So if it
+--   cancels none, and says nothing, this takes 'Behavior.Ros.patience'.)
 -- [Failure] 'ServiceFailed', if the server does not cancel them, or is not there; 'TooSlow', 'NoServer' as
 --   'Behavior.Ros.call'.
 -- [Fault] 'NotConfirmed', if the server does not say within 'Behavior.Ros.patience' that they have ended: the robot may
@@ -71,26 +72,35 @@ import Behavior.Trace (named)
 -- @since 0.1.0.0
 stopAll :: Ros -> Action a -> Behavior ()
 stopAll ros which = named ("stop all goals: " ++ name) $ do
-  -- (Subscribed to before the call: no change is missed.)
   known <- subscribed ros statuses
   left <- now >>= atomically . leftBehind ros (nameIn ros which)
   Cancelling how goals <- call ros (service (name ++ "/_action/cancel_goal") :: Service CancelGoal) ()
   when (how == rejected) $ throwIO (ServiceFailed name "it does not cancel them")
-  timeout (patience (rosOptions ros)) (untilEnded goals) ? do
-    saidNothing <- isNothing <$> readTVarIO (newest known)
+  before <- readTVarIO (arrivals known)
+  timeout (patience (rosOptions ros)) (atomically (askAgain known) >> untilEnded goals (since before known)) ? do
+    saidNothing <- (== before) <$> readTVarIO (arrivals known)
     unless (saidNothing && null goals) $ throwIO (NotConfirmed name "its server has not said that they have ended")
   atomically (modifyTVar' (sent ros) (`Map.withoutKeys` left))
  where
   name = Text.unpack (nameIn ros which)
   statuses = topic (Text.unpack (statusOf (nameIn ros which))) latched :: Topic Statuses
   rejected = 1
+  -- What was said before the answer may be older than the answer, or from a server that has crashed and is there again.
+  askAgain known = do
+    isSaid <- isJust <$> readTVar (newest known)
+    let there = statusOf (nameIn ros which)
+    when isSaid $ traverse_ (ask ros) [Unsubscribe there, Subscribe there (keptType known)]
+  since before known =
+    (\said n -> if n > before then Just said else Nothing)
+      <$> latest ros statuses <*> Signal.watching (readTVar (arrivals known))
   -- (A server names only those that it begins to cancel now. What else runs is in what it says of all goals.)
-  untilEnded goals = do
-    Statuses before <- Signal.read (latest ros statuses)
-    let running = [g | (g, status) <- before, not (hasEnded status)]
-        -- (It has forgotten what it no longer names.)
-        isOver known g = maybe (g `elem` running) hasEnded (lookup g known)
-    Signal.waitUntil ((\(Statuses known) -> all (isOver known) (goals ++ running)) <$> latest ros statuses)
+  untilEnded goals said = do
+    Signal.waitUntil (isJust <$> said)
+    running <- foldMap (\(Statuses known) -> [g | (g, status) <- known, not (hasEnded status)]) <$> Signal.read said
+    -- (It has forgotten what it no longer names.)
+    let isOver known g = maybe (g `elem` running) hasEnded (lookup g known)
+        areOver (Statuses known) = all (isOver known) (goals ++ running)
+    Signal.waitUntil (maybe False areOver <$> said)
 
 -- | Our goals on that action that may still run although nothing waits for them, and that have come to their server, or
 -- never will.
