@@ -95,6 +95,7 @@ spec = guarded $ do
             , sendFrame = \_ -> atomically (writeTVar isSubscribed True)
             , -- (From the sixth on they are answered: the frame arrives after the eighth.)
               sendPing = atomically (stateTVar pings (\n -> (n + 1, n + 1))) >>= \n -> when (n > 5) pong
+            , bytesCame = pure 0
             , sendClose = pure ()
             }
         arrives = do
@@ -104,6 +105,24 @@ spec = guarded $ do
       arrives `both` do
         level <- Signal.read (latest ros (topic "/level" latched))
         level `shouldBe` Std (Just 0.5 :: Maybe Double)
+  it "a link is not lost while a frame takes long to come" $ do
+    (pings, isSubscribed, frames) <- (,,) <$> newTVarIO (0 :: Int) <*> newTVarIO False <*> newTVarIO (1 :: Int)
+    let way = Transport "slow" Nothing (pure "") (\_ _ use -> use connection)
+        connection =
+          Connection
+            { receiveFrame = atomically $ do
+                (&&) <$> ((>= 8) <$> readTVar pings) <*> readTVar isSubscribed >>= check
+                stateTVar frames (\n -> (n, n - 1)) >>= check . (> 0)
+                pure "{\"op\":\"publish\",\"topic\":\"/level\",\"msg\":{\"data\":0.5}}"
+            , sendFrame = \_ -> atomically (writeTVar isSubscribed True)
+            , sendPing = atomically (modifyTVar' pings (+ 1))
+            , -- (Of the frame a byte comes after each ping.)
+              bytesCame = readTVar pings
+            , sendClose = pure ()
+            }
+    withRosWith defaultRosOptions {pingEvery = 0.01, pongWithin = 5} way $ \ros -> do
+      level <- Signal.read (latest ros (topic "/level" latched))
+      level `shouldBe` Std (Just 0.5 :: Maybe Double)
   it "an answer to the handshake that does not end is refused" $
     bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
       port <- socketPort listening

@@ -63,6 +63,7 @@ fakeRos robot =
       { receiveFrame = atomically (unlessBroken it (onceNotFrozen (readTQueue (toClient it))))
       , sendFrame = \frame -> now >>= \time -> atomically (unlessBroken it (unlessFrozen (takeFrame it time frame)))
       , sendPing = atomically (unlessBroken it (readTVar (isFrozen robot))) >>= \frozen -> unless frozen received
+      , bytesCame = pure 0
       , sendClose = atomically (unlessBroken it (unlessFrozen (writeTVar (isBroken it) True)))
       }
   takeFrame it time frame = do

@@ -119,8 +119,10 @@ connected ros transport = do
         first <- atomically (writeTVar up True >> comeUp ros time)
         -- (A trace shows when the link was there, and why no longer.)
         named ("link: " ++ robot ros) $
-          firstOf (map whyItEnds [reading ros connection, writing ros connection first, pinging ros, settling ros])
+          firstOf (map whyItEnds (threads connection first))
             >>= \why -> readTVarIO (link ros) >>= \l -> if isClosing l then pure why else throwIO (LinkEnds why)
+      threads connection first =
+        [reading ros connection, writing ros connection first, pinging ros connection, settling ros]
       oneConnection = connecting transport (frameBytes (rosOptions ros)) (atomically (receivedAny ros)) use
       tooLong = do
         timeout connectWithin (atomically (readTVar up >>= check)) ? throwIO (LinkEnds "it takes too long to connect")
@@ -184,13 +186,14 @@ settling ros = do
   more <- atomically (settle ros)
   if more then settling ros else sleepForever
 
--- | Asks whether the bridge is there. Anything that comes is an answer. (While a frame is being read, answers wait
--- behind it.)
-pinging :: Ros -> Behavior a
-pinging ros = forever $ do
+-- | Asks whether the bridge is there. Anything that comes is an answer, also a part of a frame: one of some megabytes
+-- takes seconds on a slow network. (While a frame is being read, answers wait behind it.)
+pinging :: Ros -> Connection -> Behavior a
+pinging ros connection = forever $ do
   sleep (pingEvery options)
-  anyCame <- atomically (pinged ros)
-  timeout (pongWithin options) (atomically ((||) <$> readTVar (isReading ros) <*> anyCame >>= check))
+  (anyCame, before) <- atomically ((,) <$> pinged ros <*> bytesCame connection)
+  let isThere = or <$> sequence [readTVar (isReading ros), anyCame, (/= before) <$> bytesCame connection]
+  timeout (pongWithin options) (atomically (isThere >>= check))
     ? throwIO (LinkEnds ("nothing was received within " ++ show (pongWithin options) ++ " s after a ping"))
  where
   options = rosOptions ros

@@ -24,7 +24,7 @@ data RosOptions = RosOptions
   , pingEvery :: Seconds
   -- ^ How often the bridge is asked whether it is there; 1 s by default.
   , pongWithin :: Seconds
-  -- ^ How long anything may take to come after that, or the link is lost; 1 s by default.
+  -- ^ How long anything may take to come after that (a part of a frame will do), or the link is lost; 1 s by default.
   , frameBytes :: Int
   -- ^ How many bytes a frame from the bridge has at most, or it is refused; 1 MiB by default. (It takes up to 0.4 s and
   -- 100 MB to read so much, if it is full of the smallest values. For the messages of one topic:

@@ -11,6 +11,7 @@ module Behavior.Ros.Internal.Transport
   , Connection (..)
   ) where
 
+import Control.Concurrent.STM (STM)
 import Data.ByteString.Lazy (ByteString)
 import Data.Text (Text)
 
@@ -32,11 +33,13 @@ data Transport = Transport
   -- what to call when something was received that is no frame (the answer to a ping).
   }
 
--- | A connection. Each of these throws when it is lost.
+-- | A connection. Each behaviour of these throws when it is lost.
 data Connection = Connection
   { receiveFrame :: Behavior ByteString
   , sendFrame :: ByteString -> Behavior ()
   , sendPing :: Behavior ()
+  , bytesCame :: STM Int
+  -- ^ How many bytes have come, also those of a frame that has not come to its end.
   , sendClose :: Behavior ()
   -- ^ Says that nothing more will be sent. Then 'receiveFrame' throws when the other end has received it all.
   }

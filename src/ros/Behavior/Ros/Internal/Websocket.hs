@@ -12,6 +12,7 @@ module Behavior.Ros.Internal.Websocket
 
 import Control.Applicative ((<|>))
 import Control.Concurrent (rtsSupportsBoundThreads)
+import Control.Concurrent.STM (TVar, modifyTVar', newTVarIO, readTVar)
 import Control.Monad (guard, when)
 import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Base64 as Base64
@@ -34,6 +35,7 @@ import Text.Read (readMaybe)
 import Behavior.Ros.Internal.Socket
 import Behavior.Ros.Internal.Tls
 import Behavior.Ros.Internal.Transport
+import Behavior.STM (atomically)
 
 -- | A bridge that speaks rosbridge v2 (rosbridge_suite, for example): on this machine, or on any by an encrypted
 -- connection.
@@ -90,18 +92,20 @@ toBridge trusted refused url = case parts url of
       , connecting = \bytes received use ->
           withSocket host port . (if isEncrypted then withTls trusted host else plainly) $ \receive send -> do
             open <- newIORef False
-            stream <- limitedUntil open receive >>= (`makeStream` send)
+            came <- newTVarIO 0
+            stream <- makeStream (limitedUntil open came receive) send
             let options = limited bytes received
             Websockets.runClientWithStream stream (authority host port) path options [] $ \connection ->
-              writeIORef open True >> use (over connection)
+              writeIORef open True >> use (over connection came)
       }
  where
   named bytes = Text.pack " of " <> decodeLatin1 (Base64.encode bytes)
-  over connection =
+  over connection came =
     Connection
       { receiveFrame = Websockets.receiveData connection
       , sendFrame = Websockets.sendTextData connection
       , sendPing = Websockets.sendPing connection Bytes.empty
+      , bytesCame = readTVar came
       , sendClose = Websockets.sendClose connection Bytes.empty
       }
   needsThreads = if rtsSupportsBoundThreads then Nothing else Just "wss needs a program that is linked with -threaded"
@@ -119,17 +123,15 @@ toBridge trusted refused url = case parts url of
 plainly :: (IO Strict.ByteString -> (Maybe Bytes.ByteString -> IO ()) -> IO a) -> Socket -> IO a
 plainly use socket = use (recv socket 32768) (traverse_ (sendAll socket))
 
--- | Receives, to the end of the connection. Until it is open, a bridge has 64 KiB for what it says.
-limitedUntil :: IORef Bool -> IO Strict.ByteString -> IO (IO (Maybe Strict.ByteString))
-limitedUntil open receive = do
-  received <- newIORef 0
-  pure $ do
-    bytes <- receive
-    isOpen <- readIORef open
-    modifyIORef' received (+ Strict.length bytes)
-    n <- readIORef received
-    when (n > 65536 && not isOpen) . ioError $ userError "its answer to the handshake is longer than 64 KiB"
-    pure (if Strict.null bytes then Nothing else Just bytes)
+-- | Receives, to the end of the connection, and counts the bytes. Until it is open, a bridge has 64 KiB for what it
+-- says.
+limitedUntil :: IORef Bool -> TVar Int -> IO Strict.ByteString -> IO (Maybe Strict.ByteString)
+limitedUntil open came receive = do
+  bytes <- receive
+  isOpen <- readIORef open
+  n <- atomically (modifyTVar' came (+ Strict.length bytes) >> readTVar came)
+  when (n > 65536 && not isOpen) . ioError $ userError "its answer to the handshake is longer than 64 KiB"
+  pure (if Strict.null bytes then Nothing else Just bytes)
 
 -- | Host and port, as an address has them.
 authority :: String -> Int -> String
