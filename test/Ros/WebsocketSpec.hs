@@ -5,6 +5,7 @@
 module Ros.WebsocketSpec (spec) where
 
 import Control.Concurrent.MVar
+import Control.Concurrent.STM (isFullTBQueue)
 import Control.Exception (bracket, try)
 import Control.Monad (forM_, forever, void, when)
 import Data.Aeson (Value, object, (.=))
@@ -21,7 +22,7 @@ import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Frame (Limits (..), Request (SendGoal), decodeRequest)
-import Behavior.Ros.Internal.Link (received)
+import Behavior.Ros.Internal.Link (outgoing, received)
 import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
 import Behavior.Ros.Messages
@@ -123,6 +124,12 @@ spec = guarded $ do
     withRosWith defaultRosOptions {pingEvery = 0.01, pongWithin = 5} way $ \ros -> do
       level <- Signal.read (latest ros (topic "/level" latched))
       level `shouldBe` Std (Just 0.5 :: Maybe Double)
+  it "a publisher ends although the bridge takes nothing" $ do
+    let stuck = Connection sleepForever (const sleepForever) sleepForever (pure 0) sleepForever
+        speed = publication "/speed" :: Publication (Std (Maybe Double))
+        full ros = atomically (isFullTBQueue (outgoing ros) >>= check)
+    withRosWith patient {pingEvery = 1000} (Transport "stuck" Nothing (pure "") (\_ _ use -> use stuck)) $ \ros ->
+      publishing ros speed (\say -> full ros ||| forever (say (Std (Just 1))))
   it "an answer to the handshake that does not end is refused" $
     bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
       port <- socketPort listening

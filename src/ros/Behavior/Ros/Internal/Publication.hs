@@ -137,7 +137,8 @@ finish ros name = do
       | n > 1 -> writeTVar (advertised ros) (Map.insert name (Advertised typeName keeps (n - 1)) known)
       | otherwise -> do
           writeTVar (advertised ros) (Map.delete name known)
-          whenUp ros (Unadvertise name)
+          -- (It does not wait: nothing interrupts it, and a bridge that takes nothing may never do so.)
+          whenUp ros (Unadvertise name) `orElse` pure ()
     Nothing -> pure ()
 
 -- | Asks the bridge, if there is a link. (Otherwise there is nothing to ask: a new connection advertises what is left.)
