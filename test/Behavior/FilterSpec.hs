@@ -174,6 +174,13 @@ debounce = do
       (changes >> hang) ||| Signal.waitUntil (Signal.debounce 1 (watchedVar level))
     (explain (outcome run), finished run) `shouldBe` ("it returned", 2.8)
 
+  it "measures from the newest of several values, none of which has lasted" $ do
+    run <- simulate $ do
+      level <- newTVarIO (0 :: Int)
+      let changes = for_ [1, 0.6] $ \pause -> sleep pause >> atomically (modifyTVar' level (+ 1))
+      (changes >> hang) ||| Signal.waitUntil ((== 2) <$> Signal.debounce 1 (watchedVar level))
+    (explain (outcome run), finished run) `shouldBe` ("it returned", 2.6)
+
   it "accepts at once the first value after a recovery" $ do
     condition <- newTestCondition True
     Signal.monitor (Signal.debounce (1 / 0) (watched condition)) (set condition (Value False)) (pure "task")

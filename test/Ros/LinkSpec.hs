@@ -172,7 +172,8 @@ onSlowBridge pause act = do
   over <- newTVarIO False
   let takes frame = modifyIORef' taken (frame :) >> sleep pause
       closes = atomically (writeTVar over True)
-      way = Transport "slow" Nothing (pure "") $ \_ received use -> use (Connection ended takes received closes)
+      way = Transport "slow" Nothing (pure "") $ \_ received use ->
+        use (Connection ended (pure 0) takes received closes)
       ended = atomically (readTVar over >>= check) >> throwIO (userError "it was closed")
       counts = publication "/count" :: Publication (Std (Maybe Double))
   end <- try . timeout 60 . withRosWith defaultRosOptions {patience = 10, pingEvery = 1000} way $ \ros ->

@@ -29,7 +29,6 @@ import Behavior
 import Behavior.Ros
 import Behavior.Ros.Action
 import Behavior.Ros.Fake
-import Behavior.Ros.Messages
 import Behavior.Sim
 import Behavior.Time (now, timeout)
 

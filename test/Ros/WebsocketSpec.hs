@@ -5,7 +5,6 @@
 module Ros.WebsocketSpec (spec) where
 
 import Control.Concurrent.MVar
-import Control.Concurrent.STM (isFullTBQueue)
 import Control.Exception (bracket, try)
 import Control.Monad (forM_, forever, void, when)
 import Data.Aeson (Value, object, (.=))
@@ -125,7 +124,7 @@ spec = guarded $ do
       level <- Signal.read (latest ros (topic "/level" latched))
       level `shouldBe` Std (Just 0.5 :: Maybe Double)
   it "a publisher ends although the bridge takes nothing" $ do
-    let stuck = Connection sleepForever (const sleepForever) sleepForever (pure 0) sleepForever
+    let stuck = Connection sleepForever (pure 0) (const sleepForever) sleepForever sleepForever
         speed = publication "/speed" :: Publication (Std (Maybe Double))
         full ros = atomically (isFullTBQueue (outgoing ros) >>= check)
     withRosWith patient {pingEvery = 1000} (Transport "stuck" Nothing (pure "") (\_ _ use -> use stuck)) $ \ros ->

@@ -61,9 +61,9 @@ fakeRos robot =
   connection received it =
     Connection
       { receiveFrame = atomically (unlessBroken it (onceNotFrozen (readTQueue (toClient it))))
+      , bytesCame = pure 0
       , sendFrame = \frame -> now >>= \time -> atomically (unlessBroken it (unlessFrozen (takeFrame it time frame)))
       , sendPing = atomically (unlessBroken it (readTVar (isFrozen robot))) >>= \frozen -> unless frozen received
-      , bytesCame = pure 0
       , sendClose = atomically (unlessBroken it (unlessFrozen (writeTVar (isBroken it) True)))
       }
   takeFrame it time frame = do

@@ -11,11 +11,14 @@ module Behavior.Ros.Internal.Socket
 import Control.Exception (bracket, bracketOnError, throwIO, try)
 import Network.Socket hiding (socket)
 
+import Behavior.Time (abandoning)
+
 -- | Connects to the host and port: to the first of its addresses that can be reached.
 withSocket :: String -> Int -> (Socket -> IO a) -> IO a
 withSocket host port = bracket (addresses >>= firstThatConnects) close
  where
-  addresses = getAddrInfo (Just defaultHints {addrSocketType = Stream}) (Just host) (Just (show port))
+  -- (Nothing interrupts the system while it asks a name server that does not answer: some ten seconds.)
+  addresses = abandoning 0.1 (getAddrInfo (Just defaultHints {addrSocketType = Stream}) (Just host) (Just (show port)))
 
 firstThatConnects :: [AddrInfo] -> IO Socket
 firstThatConnects = go (ioError (userError "the host has no address"))

@@ -36,10 +36,10 @@ data Transport = Transport
 -- | A connection. Each behaviour of these throws when it is lost.
 data Connection = Connection
   { receiveFrame :: Behavior ByteString
-  , sendFrame :: ByteString -> Behavior ()
-  , sendPing :: Behavior ()
   , bytesCame :: STM Int
   -- ^ How many bytes have come, also those of a frame that has not come to its end.
+  , sendFrame :: ByteString -> Behavior ()
+  , sendPing :: Behavior ()
   , sendClose :: Behavior ()
   -- ^ Says that nothing more will be sent. Then 'receiveFrame' throws when the other end has received it all.
   }

@@ -52,6 +52,9 @@ import Behavior.STM (atomically)
 -- what uses it fails with 'Behavior.Ros.NoServer', which says why. The robot does not check who you are: that is for
 -- the network, or for a proxy before the bridge. (The program has to be linked with @-threaded@.)
 --
+-- While the system asks a name server that does not answer, nothing interrupts it: 'Behavior.Ros.withRos', if it is
+-- stopped then, goes on without it after 0.1 s, and reports that as 'Behavior.Time.abandoning' does.
+--
 -- @since 0.1.0.0
 rosbridge :: String -> Transport
 rosbridge = toBridge Nothing $ \host ->
@@ -103,9 +106,9 @@ toBridge trusted refused url = case parts url of
   over connection came =
     Connection
       { receiveFrame = Websockets.receiveData connection
+      , bytesCame = readTVar came
       , sendFrame = Websockets.sendTextData connection
       , sendPing = Websockets.sendPing connection Bytes.empty
-      , bytesCame = readTVar came
       , sendClose = Websockets.sendClose connection Bytes.empty
       }
   needsThreads = if rtsSupportsBoundThreads then Nothing else Just "wss needs a program that is linked with -threaded"
