@@ -310,6 +310,13 @@ scopes = do
       (outcomeToIO =<< atomically (outcome badly)) `shouldThrow` (== Failed)
       pure (pure ())
 
+  it "does not lose the stop request of another thread, which a branch throws as it stops" $ do
+    self <- myThreadId
+    begun <- newGate
+    let other = Stop self (SiblingFinished "sibling")
+    ending (pass begun `parallel` ((open begun >> hang) `onException` throwIO other))
+      `shouldReturn` CancelledBy (show other)
+
   it "does not let a cancellation that arrives while branches stop interrupt the caller's handlers" $ do
     inside <- newGate
     cleaning <- newGate

@@ -167,6 +167,10 @@ causes = do
     "the right sibling failed"
     (\begun stoppable -> both stoppable (pass begun >> failed) ? pure ())
     (SiblingFailed "right")
+  cause
+    "the right sibling of parallel failed"
+    (\begun stoppable -> (stoppable ||| (pass begun >> failed)) ? pure ())
+    (SiblingFailed "right")
   cause "the third sibling finished" (\begun stoppable -> firstOf [stoppable, hang, pass begun]) (SiblingFinished "3")
   cause
     "the second sibling failed"
