@@ -288,6 +288,16 @@ scopes = do
       pure (pure ())
     done `shouldBe` ["cleaned up"]
 
+  it "has requested the stop, or can do so again, when its caller is interrupted just then" $
+    for_ [1 .. 4000 :: Int] $ \n -> inScope $ \scope -> do
+      inside <- newGate
+      running <- branch scope "branch" (open inside >> hang) :: IO (Branch ())
+      pass inside
+      caller <- mask_ (start label (requestStop cause [SomeBranch running]))
+      _ <- evaluate (sum [1 .. n `mod` 400])
+      interrupt (threadId caller) (Cancel "user")
+      pure (pure ())
+
   it "requests the stops of uninterruptible branches without waiting" $ do
     (end, done) <- observing $ \entries -> inScope $ \scope -> do
       insides <- replicateM 3 newGate
