@@ -294,6 +294,7 @@ scopes = do
       running <- branch scope "branch" (open inside >> hang) :: IO (Branch ())
       pass inside
       caller <- mask_ (start label (requestStop cause [SomeBranch running]))
+      -- (With two capabilities the request is at another of its steps each time.)
       _ <- evaluate (sum [1 .. n `mod` 400])
       interrupt (threadId caller) (Cancel "user")
       pure (pure ())

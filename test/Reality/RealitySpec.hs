@@ -38,7 +38,7 @@ data Effort = Effort
 
 -- | The amount for each run of the test suite.
 spec :: Spec
-spec = specWith (Effort 100 200 1 25 1000 200 5)
+spec = specWith (Effort 100 200 1 25 1000 200 1)
 
 specWith :: Effort -> Spec
 specWith effort = do

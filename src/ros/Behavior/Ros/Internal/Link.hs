@@ -32,6 +32,7 @@ module Behavior.Ros.Internal.Link
   , Kept (..)
   , Arrival (..)
   , keptOf
+  , subscribeAgain
   , wantBytes
   , Reply (..)
   , mayRun
@@ -41,6 +42,7 @@ module Behavior.Ros.Internal.Link
 import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (unless, when)
 import Data.Aeson (Value)
+import Data.Foldable (traverse_)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import Data.Text (Text)
@@ -248,6 +250,10 @@ keptOf ros name typeName time =
       l <- readTVar (link ros)
       when (isUp l) (ask ros (Subscribe name typeName))
       pure topic
+
+-- | Subscribes again to the topic with this name and type: what its publisher keeps for new subscribers comes again.
+subscribeAgain :: Ros -> Text -> Text -> STM ()
+subscribeAgain ros name typeName = traverse_ (ask ros) [Unsubscribe name, Subscribe name typeName]
 
 -- | Messages of the topic may have the given number of bytes, from now on.
 wantBytes :: Ros -> Kept -> Int -> STM ()

@@ -15,7 +15,6 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (throwIO)
 import Control.Monad (unless, when)
 import Data.Aeson (Value, object, withObject, (.=))
-import Data.Foldable (traverse_)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust)
 import Data.Set (Set)
@@ -25,7 +24,7 @@ import qualified Data.Text as Text
 import Behavior (Behavior, Seconds, (?))
 import Behavior.Ros.Internal.Call
 import Behavior.Ros.Internal.Error
-import Behavior.Ros.Internal.Frame (Id, Request (..))
+import Behavior.Ros.Internal.Frame (Id)
 import Behavior.Ros.Internal.Goal
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
@@ -88,8 +87,7 @@ stopAll ros which = named ("stop all goals: " ++ name) $ do
   -- What was said before the answer may be older than the answer, or from a server that has crashed and is there again.
   askAgain known = do
     isSaid <- isJust <$> readTVar (newest known)
-    let there = statusOf (nameIn ros which)
-    when isSaid $ traverse_ (ask ros) [Unsubscribe there, Subscribe there (keptType known)]
+    when isSaid $ subscribeAgain ros (statusOf (nameIn ros which)) (keptType known)
   since before known =
     (\said n -> if n > before then Just said else Nothing)
       <$> latest ros statuses <*> Signal.watching (readTVar (arrivals known))

@@ -26,7 +26,6 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, bracket_, throw, toException)
 import Control.Monad (join, unless, void, when)
 import Data.Aeson (Value)
-import Data.Foldable (traverse_)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (isNothing)
 import Data.Proxy (Proxy (..))
@@ -39,7 +38,6 @@ import Behavior.Internal.Reactive.Inbox (Inbox, deliver, withInbox)
 import Behavior.Internal.Signal.Source
 import Behavior.Parallel (firstOf)
 import Behavior.Ros.Internal.Error
-import Behavior.Ros.Internal.Frame (Request (..))
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Message
 import Behavior.STM (atomically)
@@ -257,7 +255,7 @@ watchSilence ros name silence known judged = do
       asked <- readTVar (askedAt known)
       when (none && up && time - asked >= 0.4 * silence) $ do
         writeTVar (askedAt known) time
-        traverse_ (ask ros) [Unsubscribe name, Subscribe name (keptType known)]
+        subscribeAgain ros name (keptType known)
 
 -- | The number in a message that may be null (which bridges write for NaN and infinity). While it is null, or NaN,
 -- the signal faults with 'NotMeasured': it compares itself into neither true nor false.

@@ -41,7 +41,7 @@ comeUp ros time = do
   pure $
     [Advertise name typeName keeps | (name, Advertised typeName keeps _) <- Map.toList topicsOfOurs]
       ++ [Subscribe name (keptType topic) | (name, topic) <- Map.toList topics]
-      ++ map subscribeStatus moving
+      ++ [Subscribe (statusOf action) typeOfStatus | action <- moving]
 
 -- | The link is down, and why. Each goal that waits for its result ends at once, as lost; and what was not sent yet is
 -- never sent.
@@ -68,9 +68,8 @@ settle ros = do
   connection <- connections <$> readTVar (link ros)
   older <- filter ((< connection) . sentIn) . Map.elems <$> readTVar (sent ros)
   -- (A bridge that has just started may not have what was said before it knew the server.)
-  for_ (nub (map sentTo older)) $ \action ->
-    traverse_ (ask ros) [Unsubscribe (statusOf action), subscribeStatus action]
+  for_ (nub (map sentTo older)) $ \action -> subscribeAgain ros (statusOf action) typeOfStatus
   pure (not (null older))
 
-subscribeStatus :: Text -> Request
-subscribeStatus action = Subscribe (statusOf action) (messageType (Proxy :: Proxy Statuses))
+typeOfStatus :: Text
+typeOfStatus = messageType (Proxy :: Proxy Statuses)
