@@ -142,6 +142,8 @@ need() {
 
 # Without an index cabal fails before it has looked for installed packages; the index
 # of an empty repository is enough. Its path must be absolute, and without spaces.
+# (Nothing here loads a library dynamically, so none is compiled for that, too; and GHC
+# needs less time with a larger nursery.)
 run_cabal() {
   local dir=dist-newstyle/offline url
   if [ "$BEHAVIOR_TOOLCHAIN" = cabal ]; then
@@ -154,7 +156,8 @@ run_cabal() {
   esac
   mkdir -p $dir/packages
   printf '%s\n' 'repository empty' "  url: $url" 'active-repositories: :none' \
-    'jobs: $ncpus' >$dir/config
+    'jobs: $ncpus' 'shared: False' 'executable-dynamic: False' \
+    'program-default-options' '  ghc-options: -j2 +RTS -A64m -n2m -RTS' >$dir/config
   env -u CABAL_CONFIG CABAL_DIR="$PWD/$dir" cabal "$@"
 }
 

@@ -8,6 +8,15 @@ import Test.Hspec
 import qualified Behavior.ReactiveSpaceSpec
 import qualified Behavior.ScaleSpec
 import qualified Behavior.SpaceSpec
+import qualified Examples.DoorBatterySpec
+import qualified Examples.DroneSpec
+import qualified Examples.FleetSpec
+import qualified Examples.PatrolSpec
+import qualified Examples.PickAndPlaceSpec
+import qualified Examples.ProgressProblemSpec
+import qualified Examples.RosMissionSpec
+import qualified Examples.TestingARobotSpec
+import qualified Examples.YourOwnMonadSpec
 import qualified Promises.PromisesSimSpec
 import qualified Ros.CallSpec
 import qualified Ros.GoalSpec
@@ -36,6 +45,17 @@ main = hspec $ do
     Ros.LinkSpec.spec
     Ros.CallSpec.spec
     Ros.MessagesSpec.spec
+  describe "Examples" $ do
+    describe "door-battery" Examples.DoorBatterySpec.spec
+    describe "progress-problem" Examples.ProgressProblemSpec.spec
+    describe "ros-mission" Examples.RosMissionSpec.spec
+    describe "Robots" $ do
+      describe "patrol" Examples.PatrolSpec.spec
+      describe "pick-and-place" Examples.PickAndPlaceSpec.spec
+      describe "drone" Examples.DroneSpec.spec
+      describe "fleet" Examples.FleetSpec.spec
+    describe "testing-a-robot" Examples.TestingARobotSpec.spec
+    describe "your own monad" Examples.YourOwnMonadSpec.spec
   describe "Many schedules" Sim.ExploreSpaceSpec.spec
   describe "Space" $ do
     Behavior.SpaceSpec.spec

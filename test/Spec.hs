@@ -41,16 +41,7 @@ import qualified Behavior.ThrowingCleanupSpec
 import qualified Behavior.TimeSpec
 import qualified Behavior.TimerWheelSpec
 import qualified Behavior.UnliftIOSpec
-import qualified Examples.DoorBatterySpec
-import qualified Examples.DroneSpec
-import qualified Examples.FleetSpec
 import qualified Examples.GreenhouseRoverSpec
-import qualified Examples.PatrolSpec
-import qualified Examples.PickAndPlaceSpec
-import qualified Examples.ProgressProblemSpec
-import qualified Examples.RosMissionSpec
-import qualified Examples.TestingARobotSpec
-import qualified Examples.YourOwnMonadSpec
 import qualified OrdinaryWordsSpec
 import qualified Paper.DoorsSpec
 import qualified Paper.ErrataSpec
@@ -144,15 +135,4 @@ main = orBridge servers . hspec $ do
     Paper.DoorsSpec.spec
     Paper.SyntaxSpec.spec
     Paper.ErrataSpec.spec
-  describe "Examples" $ do
-    describe "door-battery" Examples.DoorBatterySpec.spec
-    describe "greenhouse-rover" Examples.GreenhouseRoverSpec.spec
-    describe "progress-problem" Examples.ProgressProblemSpec.spec
-    describe "ros-mission" Examples.RosMissionSpec.spec
-    describe "Robots" $ do
-      describe "patrol" Examples.PatrolSpec.spec
-      describe "pick-and-place" Examples.PickAndPlaceSpec.spec
-      describe "drone" Examples.DroneSpec.spec
-      describe "fleet" Examples.FleetSpec.spec
-    describe "testing-a-robot" Examples.TestingARobotSpec.spec
-    describe "your own monad" Examples.YourOwnMonadSpec.spec
+  describe "Examples" $ describe "greenhouse-rover" Examples.GreenhouseRoverSpec.spec

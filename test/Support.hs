@@ -14,6 +14,7 @@ module Support
   , within
   , leavingNothing
   , onOneCapability
+  , sampled
   , sampling
 
     -- * Gates
@@ -71,7 +72,7 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (replicateM_, unless)
 import Data.Foldable (for_, traverse_)
-import Data.Maybe (isJust, isNothing)
+import Data.Maybe (isNothing)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import System.Environment (lookupEnv)
 import System.Mem.Weak (deRefWeak)
@@ -130,13 +131,16 @@ leavingNothing act = mask $ \restore -> do
 onOneCapability :: IO a -> IO a
 onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCapabilities . const
 
--- | Tries that many random inputs where all tests run under all runtimes (the variable @EVERYWHERE@ is set, as in
--- CI), and a third of them otherwise. With @--qc-max-success@, that many of what is cheapest: the number here is
--- the share of it, in 3,000.
+-- | That many of what is tried at random where all tests run under all runtimes (the variable @EVERYWHERE@ is set, as
+-- in CI), and a tenth of them otherwise.
+sampled :: Int -> IO Int
+sampled whole = maybe (whole `div` 10) (const whole) <$> lookupEnv "EVERYWHERE"
+
+-- | Tries as many random inputs as 'sampled' says. With @--qc-max-success@, that many of what is cheapest: the number
+-- here is the share of it, in 3,000.
 sampling :: Int -> Spec -> Spec
 sampling share tests = do
-  everywhere <- runIO (isJust <$> lookupEnv "EVERYWHERE")
-  let least = if everywhere then share else share `div` 3
+  least <- runIO (sampled share)
   modifyMaxSuccess (\asked -> max least (asked * share `div` 3000)) tests
 
 -- | Blocks the threads that pass it until it is opened; it is never closed again.

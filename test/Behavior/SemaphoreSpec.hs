@@ -40,12 +40,9 @@ spec = guarded $ do
   it "gives the unit back after the cleanup of the behaviour" $ do
     semaphore <- atomically (newTSem 1)
     entries <- newLog
-    both
-      ( timeout 0 (withTSem semaphore hang)
-          ? timeout 0.001 (withTSem semaphore (hang `uninterruptibly` note entries 'a'))
-          ? pure ()
-      )
-      (pure ())
+    isHeld <- newGate
+    timeout 0 (withTSem semaphore hang) ? pure ()
+    withTSem semaphore ((open isHeld >> hang) `uninterruptibly` note entries 'a') ||| pass isHeld
     withTSem semaphore (note entries 'b')
     notes entries `shouldReturn` "ab"
 

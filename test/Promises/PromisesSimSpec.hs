@@ -11,6 +11,7 @@ import Test.Hspec
 import Promises.Properties
 import Promises.Stage
 import Promises.Trying
+import Support (sampled)
 
 spec :: Spec
 spec = do
@@ -20,9 +21,10 @@ spec = do
         modifyIORef' explored (<> t)
         schedulesExplored t `shouldSatisfy` (>= needed)
       counted = readIORef explored >>= \t -> putStrLn ("  (explored: " ++ show t ++ ")")
+  random <- runIO (sampled randomSchedules)
   afterAll_ counted . forM_ promises $ \promise -> describe (promised promise) $ do
     it "under random schedules" $
-      counting randomSchedules (underRandom 1 randomSchedules promise)
+      counting random (underRandom 1 random promise)
     it "under all schedules of small programs, with up to two pre-emptions" $
       counting smallPrograms (underAll 1 2 100000 smallPrograms promise)
     it "in reality" $

@@ -15,6 +15,7 @@ import Data.Int (Int32)
 import Data.Maybe (isJust)
 import Data.Proxy (Proxy (..))
 import Data.Text (Text)
+import qualified Data.Text as Text
 import Test.Hspec hiding (parallel)
 import Test.QuickCheck (property, (===))
 
@@ -72,7 +73,7 @@ spec = guarded $ do
       atomically (unhandled inbox) >>= (`shouldBe` 0)
     it "may be larger where the topic allows it" . withRobot $ \robot ros -> do
       let texts = topic "/texts" latched :: Topic (Std Text)
-          large name = publish robot name (object ["data" .= replicate 1200000 'x']) >> sleep 1
+          large name = publish robot name (object ["data" .= Text.replicate 1200000 "x"]) >> sleep 1
           comes t = isJust <$> stopAfter 1 (Signal.read (latest ros t))
       comes texts >>= (`shouldBe` False)
       large "/texts"

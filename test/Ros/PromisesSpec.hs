@@ -9,9 +9,11 @@ import Test.Hspec
 import Promises.Stage (promised)
 import Promises.Trying
 import Ros.Promised
+import Support (sampled)
 
 spec :: Spec
 spec =
   it (promised keptByMissions) $ do
-    tried <- underRandom 1 2000 keptByMissions
-    schedulesExplored tried `shouldSatisfy` (>= 2000)
+    schedules <- sampled 2000
+    tried <- underRandom 1 schedules keptByMissions
+    schedulesExplored tried `shouldSatisfy` (>= schedules)

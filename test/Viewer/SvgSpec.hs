@@ -44,7 +44,8 @@ spec = do
     prop "with any events" $ forAllBlind likelyEvents check
 
   it "shows the texts as they are" $
-    [name | name <- take 4 oddTexts, not (any ((name ++ "\n") `isPrefixOf`) (titles (drawn oddEvents)))] `shouldBe` []
+    let shown = titles (drawn oddEvents)
+    in [name | name <- take 4 oddTexts, not (any ((name ++ "\n") `isPrefixOf`) shown)] `shouldBe` []
 
   describe "has less than 300 KB at 10,000 spans" $ do
     let size = length . svg

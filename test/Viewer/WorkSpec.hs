@@ -105,9 +105,9 @@ views =
  where
   size = fromIntegral . length
 
-allocatedBy :: (a -> Int64) -> a -> IO Int64
+allocatedBy :: Show a => (a -> Int64) -> a -> IO Int64
 allocatedBy work made = do
-  _ <- evaluate (work made)
+  _ <- evaluate (length (show made))
   setAllocationCounter 0
   _ <- evaluate (work made)
   negate <$> getAllocationCounter
