@@ -14,7 +14,7 @@ module Support
   , within
   , leavingNothing
   , onOneCapability
-  , sampled
+  , sampleOf
   , sampling
 
     -- * Gates
@@ -133,14 +133,14 @@ onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCap
 
 -- | That many of what is tried at random where all tests run under all runtimes (the variable @EVERYWHERE@ is set, as
 -- in CI), and a tenth of them otherwise.
-sampled :: Int -> IO Int
-sampled whole = maybe (whole `div` 10) (const whole) <$> lookupEnv "EVERYWHERE"
+sampleOf :: Int -> IO Int
+sampleOf whole = maybe (whole `div` 10) (const whole) <$> lookupEnv "EVERYWHERE"
 
--- | Tries as many random inputs as 'sampled' says. With @--qc-max-success@, that many of what is cheapest: the number
+-- | Tries as many random inputs as 'sampleOf' says. With @--qc-max-success@, that many of what is cheapest: the number
 -- here is the share of it, in 3,000.
 sampling :: Int -> Spec -> Spec
 sampling share tests = do
-  least <- runIO (sampled share)
+  least <- runIO (sampleOf share)
   modifyMaxSuccess (\asked -> max least (asked * share `div` 3000)) tests
 
 -- | Blocks the threads that pass it until it is opened; it is never closed again.

@@ -11,7 +11,7 @@ import Test.Hspec
 import Promises.Properties
 import Promises.Stage
 import Promises.Trying
-import Support (sampled)
+import Support (sampleOf)
 
 spec :: Spec
 spec = do
@@ -21,7 +21,7 @@ spec = do
         modifyIORef' explored (<> t)
         schedulesExplored t `shouldSatisfy` (>= needed)
       counted = readIORef explored >>= \t -> putStrLn ("  (explored: " ++ show t ++ ")")
-  random <- runIO (sampled randomSchedules)
+  random <- runIO (sampleOf randomSchedules)
   afterAll_ counted . forM_ promises $ \promise -> describe (promised promise) $ do
     it "under random schedules" $
       counting random (underRandom 1 random promise)

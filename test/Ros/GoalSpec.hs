@@ -9,6 +9,7 @@ import Control.Exception (MaskingState (Unmasked), finally, throwIO, try)
 import Control.Monad (void)
 import Data.Aeson (Value (..), object, (.=))
 import Data.IORef
+import Data.List (isPrefixOf)
 import Test.Hspec hiding (parallel)
 
 import Behavior
@@ -18,7 +19,9 @@ import Behavior.Ros.Action
 import Behavior.Ros.Fake
 import Behavior.STM
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (events, simulate)
 import Behavior.Time
+import Behavior.Trace hiding (named)
 import Ros.Stage
 import Support (guarded)
 
@@ -188,6 +191,37 @@ spec = guarded $ do
         let losing = sleep 10 >> loseLink robot >> sleep 55 >> restoreLink robot >> sleepForever
         _ <- firstOf [losing, tried (carrying ros "cup") <* sleep 60]
         void (carrying ros "pot")
+
+  describe "In a trace" $ do
+    let spansOf run = [(spanName s, spanBegan s, time, how) | Ended s time how <- events run, about (spanName s)]
+        about name = any (`isPrefixOf` name) ["goal", "may still move"]
+        -- What was noticed: when, and the name of the span around it.
+        noticedIn run =
+          [ (reactionOperator r, reactionTime r, spansAround run (reactionParent r), reactionChanges r)
+          | Reacted r <- events run
+          , reactionOperator r == "goal"
+          ]
+        spansAround run parent = [spanName s | Began s <- events run, parent == Inside (spanNumber s)]
+    it "a goal is a span with its outcome, in which its id is noticed" $ do
+      run <- simulate . mission (const slowly) $ \_ ros -> awaitUp ros >> stopAfter 10 (carrying ros "cup") >> sleep 1
+      [(name, began, end) | (name, began, end, _) <- spansOf run] `shouldBe` [("goal: /carry", 0, 10.5)]
+      [() | (_, _, _, StoppedBy _) <- spansOf run] `shouldBe` [()]
+      noticedIn run `shouldBe` [("goal", 0, ["goal: /carry"], [Change "id" Nothing "goal 1"])]
+    it "a goal that does not stop is a span of its own until it has ended, and has its id" $ do
+      run <- simulate . mission (const stubborn) $ \_ ros -> do
+        awaitUp ros
+        _ <- tried (stopAfter 10 (carrying ros "cup"))
+        sleep 60
+      [(name, began, end) | (name, began, end, Succeeded) <- spansOf run] `shouldBe` [("may still move: /carry", 12, 60)]
+      [(time, outside, changes) | ("goal", time, outside, changes) <- noticedIn run, time > 0]
+        `shouldBe` [(12, ["may still move: /carry"], [Change "id" Nothing "goal 1"])]
+    it "so is one whose link was lost, until the robot says that it runs no longer" $ do
+      run <- simulate . mission (const slowly) $ \robot ros -> do
+        awaitUp ros
+        let losing = sleep 10 >> loseLink robot >> sleep 5 >> restoreLink robot >> sleepForever
+        _ <- firstOf [losing, tried (carrying ros "cup")]
+        sleep 5 >> restoreLink robot >> sleep 60
+      [(name, began, end) | (name, began, end, Succeeded) <- spansOf run] `shouldBe` [("may still move: /carry", 10, 60)]
 
 -- | An action whose goals and results are numbers.
 data Counting

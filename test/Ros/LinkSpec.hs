@@ -25,7 +25,7 @@ import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (events, simulate)
 import Behavior.Time
-import Behavior.Trace (End (..), Event (..), Span (..))
+import Behavior.Trace (Change (..), End (..), Event (..), Reaction (..), Span (..))
 import Ros.Stage
 import Support (ending, guarded)
 import qualified Support
@@ -119,6 +119,15 @@ spec = guarded $ do
         sleep 1
       [(spanBegan s, time, how) | Ended s time how <- events run, spanName s == "link: the fake robot"]
         `shouldBe` [(0, 1, FaultedWith "user error (connection lost)"), (2.5, 3.5, Succeeded)]
+    it "is noticed in a trace when it comes up and when it is lost, and why" $ do
+      run <- simulate . mission (const slowly) $ \robot ros -> do
+        Signal.waitUntil (linkUp ros)
+        sleep 1 >> loseLink robot >> sleep 1 >> restoreLink robot
+        Signal.waitUntil (linkUp ros)
+      let up = Change "link up" (Just "False") "True"
+          down = Change "link up" (Just "True") "False"
+      [(reactionTime r, reactionChanges r) | Reacted r <- events run, reactionOperator r == "link"]
+        `shouldBe` [(0, [up]), (1, [Change "cause" Nothing "user error (connection lost)", down]), (2.5, [up])]
     it "of another robot is not concerned" . underSchedules 40 . withFakeRobot [] $ \one ->
       mission (const slowly) $ \_ ros ->
         (sleep 5 >> loseLink one) `both` withRos (fakeRos one) (\_ -> inSeconds 60 (void (carrying ros "cup")))

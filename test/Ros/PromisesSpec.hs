@@ -9,11 +9,11 @@ import Test.Hspec
 import Promises.Stage (promised)
 import Promises.Trying
 import Ros.Promised
-import Support (sampled)
+import Support (sampleOf)
 
 spec :: Spec
 spec =
   it (promised keptByMissions) $ do
-    schedules <- sampled 2000
+    schedules <- sampleOf 2000
     tried <- underRandom 1 schedules keptByMissions
     schedulesExplored tried `shouldSatisfy` (>= schedules)

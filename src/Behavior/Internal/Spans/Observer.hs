@@ -22,10 +22,13 @@ module Behavior.Internal.Spans.Observer
   , rereads
   , starts
   , waits
+
+    -- * What is no operator's
+  , noticed
   ) where
 
 import Control.Exception (SomeException, finally, mask_)
-import Data.Foldable (for_)
+import Data.Foldable (for_, traverse_)
 import Data.IORef (IORef, newIORef, readIORef, writeIORef)
 import Data.List (mapAccumL, nub)
 import qualified Data.Map.Strict as Map
@@ -105,19 +108,23 @@ decidesObserved here operator cell always after = do
       n <- newNumber here
       t <- traceClock (trace here)
       let changes = changesBetween (fromMaybe [] (lastValues seen)) after
-          reacted =
-            Reaction
-              { reactionNumber = n
-              , reactionParent = Top -- differs between the receivers
-              , reactionOperator = operator
-              , reactionTime = t
-              , reactionChanges = changes
-              , reactionStopped = Nothing
-              , reactionStarts = Nothing
-              }
+          reacted = reactionTo changes operator n t
       writeIORef cell seen {lastValues = Just after, reaction = Just reacted, isReported = False}
       pure (SignalChanged n changes)
 {-# NOINLINE decidesObserved #-}
+
+-- | A reaction that has stopped and started nothing yet.
+reactionTo :: [Change] -> String -> Int -> Seconds -> Reaction
+reactionTo changes operator n t =
+  Reaction
+    { reactionNumber = n
+    , reactionParent = Top -- differs between the receivers
+    , reactionOperator = operator
+    , reactionTime = t
+    , reactionChanges = changes
+    , reactionStopped = Nothing
+    , reactionStarts = Nothing
+    }
 
 -- | What the values were before, and are now. (Several signals may have the same name: then the first of them
 -- before belongs to the first of them now, and so on.) Of ordered rules, only the values of conditions that have
@@ -194,3 +201,15 @@ report (Observer here _ cell) next = mask_ $ do
   writeIORef cell seen {isReported = True}
   for_ (if isReported seen then Nothing else reaction seen) $ \reacted ->
     reportEach here $ \receiver -> Reacted reacted {reactionParent = parentFor receiver here, reactionStarts = next}
+
+-- | Reports what something other than an operator has noticed, under its name, as a reaction that stops and starts
+-- nothing. Without a trace it does nothing.
+noticed :: String -> [Change] -> IO ()
+noticed name changes =
+  myPlace >>= traverse_ (\here -> mask_ (reportNoticed name changes here))
+
+reportNoticed :: String -> [Change] -> Place -> IO ()
+reportNoticed name changes here = do
+  n <- newNumber here
+  t <- traceClock (trace here)
+  reportEach here $ \receiver -> Reacted (reactionTo changes name n t) {reactionParent = parentFor receiver here}

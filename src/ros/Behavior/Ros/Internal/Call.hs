@@ -117,7 +117,7 @@ call ros (Service relative typeName) question = named ("call: " ++ name) $ do
   mask $ \restore -> do
     (n, reply) <- handOver ros restore (asking message)
     (restore (answerTo reply) `finally` atomically (modifyTVar' (calls ros) (Map.delete n))) >>= \case
-      Just (Answered values) -> restore (atomically (either (throwSTM . Undecodable name) pure (decoded values)))
+      Just (Answered values) -> restore (expectedFrom name values)
       Just (Refused why) -> throwIO (ServiceFailed name (textOf why))
       Just NoReply -> atomically (readTVar (link ros) >>= throwSTM . LinkLost (robot ros) . whyLost)
       Nothing -> throwIO (TooSlow name limit)

@@ -33,6 +33,7 @@ import Data.Text (Text)
 import qualified Data.Text as Text
 
 import Behavior (Behavior, (?))
+import Behavior.Internal.Spans.Observer (noticed)
 import Behavior.Parallel (firstOf)
 import Behavior.Ros.Internal.Error
 import Behavior.Ros.Internal.Frame (Request (..))
@@ -44,7 +45,7 @@ import Behavior.Ros.Internal.Status
 import Behavior.STM (atomically)
 import Behavior.Signal (Signal, watching)
 import Behavior.Time (cleanupWithin, now, sleepForever, timeout)
-import Behavior.Trace (named)
+import Behavior.Trace (Change (..), named)
 
 -- $setup
 -- >>> import Behavior
@@ -190,9 +191,10 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ do
   mask $ \restore -> do
     -- (It is registered and handed over in one transaction: no interruption comes between.)
     (n, running) <- handOver ros restore (start ros which message latest)
+    noticed "goal" [Change "id" Nothing (Text.unpack n)]
     try (restore (atomically (awaitEnd running))) >>= \case
       -- (An interruption ends also a user's decoder that does not end.)
-      Right (Ended 4 values) -> restore (atomically (expected which values))
+      Right (Ended 4 values) -> restore (expectedFrom name values)
       Right how -> atomically (conclude how)
       Left stop -> confirmation ros which n running >>= afterStop stop
  where
@@ -246,7 +248,7 @@ confirmation :: Ros -> Action a -> Text -> Sent -> Behavior SentEnd
 confirmation ros which n running = do
   begun <- now
   _ <- cleanupWithin limit (askEvery begun ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
-  atomically ((running `endWith` Unconfirmed) >> awaitEnd running)
+  atomically (leave ros n running Unconfirmed >> awaitEnd running)
  where
   limit = patience (rosOptions ros)
   askEvery begun pauses = do

@@ -11,15 +11,17 @@ module Behavior.Ros.Internal.Keeper
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (ErrorCall (..), Exception, finally, throwIO)
-import Control.Monad (forever, join, void)
+import Control.Monad (forever, join, void, when)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (for_, traverse_)
 import qualified Data.Map.Strict as Map
+import qualified Data.Text as Text
 import Prelude hiding (take)
 
 import Behavior (Behavior, Seconds, sleep, tryAny, (?))
 import Behavior.Internal.Core.Seconds (duration)
-import Behavior.Parallel (firstOf)
+import Behavior.Internal.Spans.Observer (noticed)
+import Behavior.Parallel (firstOf, fork, scoped)
 import Behavior.Ros.Internal.Frame
 import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Options
@@ -30,7 +32,7 @@ import Behavior.Ros.Internal.Transport
 import Behavior.Ros.Internal.UpDown
 import Behavior.STM (atomically)
 import Behavior.Time (cleanupWithin, now, sleepForever, timeout)
-import Behavior.Trace (named)
+import Behavior.Trace (Change (..), named)
 
 -- $setup
 -- >>> import Behavior.Ros
@@ -75,7 +77,7 @@ withRosWith options transport behavior = do
   traverse_ (throwIO . ErrorCall) (refusal transport)
   ending <- newSuffix transport
   ros <- newRos (address transport) ending options
-  servedBy (keeping ros transport) (firstOf [behavior ros, reporting ros] `finally` closing ros)
+  servedBy (keeping ros transport) (firstOf [behavior ros, reporting ros, tracing ros] `finally` closing ros)
     `finally` atomically (goDown ros "its withRos has ended" >> modifyTVar' (link ros) (\l -> l {isClosed = True}))
  where
   durations = [noServerAfter, patience, tooSlowAfter, pingEvery, pongWithin, firstPause, longestPause]
@@ -94,6 +96,14 @@ closeWithin = 1
 reporting :: Ros -> Behavior a
 reporting ros = forever (atomically (readTBQueue (reports ros)) >>= onReport (rosOptions ros))
 
+-- | Each goal that nothing waits for, but that may still run, is a span in a trace, until it is known to have ended.
+tracing :: Ros -> Behavior a
+tracing ros = scoped $ \nursery -> forever $ do
+  (n, action) <- atomically (readTQueue (newlyLeft ros))
+  fork nursery . named ("may still move: " ++ Text.unpack action) $ do
+    noticed "goal" [Change "id" Nothing (Text.unpack n)]
+    atomically (readTVar (sent ros) >>= check . Map.notMember n)
+
 -- | Connects, and connects again whenever the link is lost.
 keeping :: Ros -> Transport -> Behavior a
 keeping ros transport = go (firstPause options)
@@ -102,9 +112,10 @@ keeping ros transport = go (firstPause options)
   go pause = do
     began <- now
     why <- connected ros transport
-    atomically (goDown ros why)
+    wasUp <- atomically ((isUp <$> readTVar (link ros)) <* goDown ros why)
     lasted <- subtract began <$> now
     over <- isClosing <$> readTVarIO (link ros)
+    when (wasUp && not over) $ noticed "link" [Change "cause" Nothing why, Change "link up" (Just "True") "False"]
     if over then sleepForever else sleep pause
     -- (A bridge that closes each connection at once is not asked ever more often.)
     go (if lasted > longestPause options then firstPause options else min (longestPause options) (2 * pause))
@@ -117,6 +128,7 @@ connected ros transport = do
   let use connection = do
         time <- now
         first <- atomically (writeTVar up True >> comeUp ros time)
+        noticed "link" [Change "link up" (Just "False") "True"]
         -- (A trace shows when the link was there, and why no longer.)
         named ("link: " ++ robot ros) $
           firstOf (map whyItEnds (threads connection first))

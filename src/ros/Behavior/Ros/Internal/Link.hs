@@ -37,6 +37,7 @@ module Behavior.Ros.Internal.Link
   , Reply (..)
   , mayRun
   , movingGoals
+  , leave
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -45,6 +46,7 @@ import Data.Aeson (Value)
 import Data.Foldable (traverse_)
 import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
+import Data.Maybe (isNothing)
 import Data.Text (Text)
 import qualified Data.Text as Text
 
@@ -82,6 +84,8 @@ data Ros = Ros
   -- ^ The topics that were subscribed to, for as long as the link is used.
   , sent :: TVar (Map Id Sent)
   -- ^ The goals that may still run.
+  , newlyLeft :: TQueue (Id, Text)
+  -- ^ Those of them that nothing waits for since then, and their actions, until a trace shows them.
   , calls :: TVar (Map Id (TVar (Maybe Reply)))
   -- ^ The calls that wait for their answer.
   , advertised :: TVar (Map Text Advertised)
@@ -148,7 +152,7 @@ newRos name ending options =
     <*> newTBQueueIO 256 <*> newTBQueueIO 256
     <*> newTVarIO False <*> newTVarIO 0 <*> newTVarIO False
     <*> newTVarIO 1
-    <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTVarIO Map.empty
+    <*> newTVarIO Map.empty <*> newTVarIO Map.empty <*> newTQueueIO <*> newTVarIO Map.empty <*> newTVarIO Map.empty
     <*> pure ""
     <*> newTVarIO (frameBytes options)
     <*> newTVarIO 0
@@ -264,3 +268,11 @@ wantBytes ros known bytes = do
 -- | Whether a goal of ours may still run on this action.
 mayRun :: Ros -> Text -> STM Bool
 mayRun ros action = any ((== action) . sentTo) <$> readTVar (sent ros)
+
+-- | Ends the goal, unless it has ended: it may still run, but nothing waits for it any more.
+leave :: Ros -> Id -> Sent -> SentEnd -> STM ()
+leave ros n known how = do
+  before <- readTVar (end known)
+  when (isNothing before) $ do
+    known `endWith` how
+    writeTQueue (newlyLeft ros) (n, sentTo known)

@@ -11,12 +11,13 @@ module Behavior.Ros.Internal.Message
   , entry
   , entryOr
   , decoded
+  , expectedFrom
   , inFull
   , textOf
   ) where
 
 import Control.DeepSeq (NFData, force)
-import Control.Exception (evaluate)
+import Control.Exception (evaluate, throwIO)
 import Data.Aeson (FromJSON, Object, Value (..), encode, parseJSON, toJSON)
 import qualified Data.Aeson.Key as Key
 import Data.Aeson.Types (Parser, explicitParseField, explicitParseFieldMaybe', parseEither)
@@ -31,6 +32,7 @@ import Data.Text.Encoding.Error (lenientDecode)
 import Data.Word (Word16, Word32, Word64, Word8)
 
 import Behavior (Behavior, Seconds)
+import Behavior.Ros.Internal.Error (RosFault (Undecodable))
 
 -- | A type of messages, or of a part of one.
 --
@@ -74,6 +76,12 @@ entryOr absent o name = fromMaybe absent <$> explicitParseFieldMaybe' fromRos o 
 -- | What it is, or why it is not.
 decoded :: RosMessage a => Value -> Either String a
 decoded = parseEither fromRos
+
+-- | What came from this source, if it is what is expected; otherwise the fault 'Undecodable'. It is read here: in the
+-- caller's thread and masking state. (In a transaction that would depend on GHC's optimization: an expression that
+-- gives a transaction may be evaluated before that runs.)
+expectedFrom :: RosMessage a => String -> Value -> Behavior a
+expectedFrom source value = evaluate (decoded value) >>= either (throwIO . Undecodable source) pure
 
 -- | All of it, with what the user's code throws in it: here, and not in the link's thread that sends it.
 inFull :: NFData a => a -> Behavior a

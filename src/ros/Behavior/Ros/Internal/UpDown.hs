@@ -56,7 +56,7 @@ goDown ros why = do
     writeTVar (isReading ros) False
     readTVar (kept ros) >>= traverse_ (\topic -> writeTVar (newest topic) Nothing)
     -- (They stay among those that may still run.)
-    readTVar (sent ros) >>= traverse_ (`endWith` Lost)
+    readTVar (sent ros) >>= traverse_ (\(n, known) -> leave ros n known Lost) . Map.toList
     readTVar (calls ros) >>= traverse_ (`setOnce` NoReply)
 
 -- | The goals of earlier connections have come to their servers by now: those that are absent have ended. Of the others
