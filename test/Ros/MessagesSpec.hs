@@ -8,10 +8,13 @@ module Ros.MessagesSpec (spec) where
 import Control.Exception (SomeException, try)
 import Control.Monad (forM_, replicateM, replicateM_)
 import Data.Aeson (Value (..), decode, object, (.=))
+import qualified Data.Aeson.Key as Key
+import qualified Data.Aeson.KeyMap as KeyMap
 import qualified Data.ByteString as ByteString
 import qualified Data.ByteString.Lazy as Lazy
 import Data.IORef
 import Data.Int (Int32)
+import Data.List (sort)
 import Data.Maybe (isJust)
 import Data.Proxy (Proxy (..))
 import Data.Text (Text)
@@ -119,6 +122,17 @@ spec = guarded $ do
       (parsed "[256]" :: Either String Bytes) `shouldSatisfy` either (const True) (const False)
     it "times, to the nanosecond" . property $ \(s :: Int32) ->
       let time = Time (s `div` 1000) 123456789 in fromSeconds (toSeconds time) === time
+    it "with the fields that Nav2's definition of NavigateToPose has" $ do
+      fieldsOf (to place) `shouldBe` ["behavior_tree", "pose"]
+      fieldsOf (NavigateToPoseResult 1 "blocked") `shouldBe` ["error_code", "error_msg"]
+      -- (Later distributions have two more, which are not read.)
+      fieldsOf (NavigateToPoseFeedback place 1.5 2 3 (Just 4.5))
+        `shouldBe` [ "current_pose"
+                   , "distance_remaining"
+                   , "estimated_time_remaining"
+                   , "navigation_time"
+                   , "number_of_recoveries"
+                   ]
     it "results from distributions that have less in them" $
       parsed "{}" `shouldBe` Right (NavigateToPoseResult 0 "")
     it "null is no number" $
@@ -128,6 +142,9 @@ spec = guarded $ do
       messageType (Proxy :: Proxy (Stamped Pose)) `shouldBe` "geometry_msgs/msg/PoseStamped"
       messageType (Proxy :: Proxy LaserScan) `shouldBe` "sensor_msgs/msg/LaserScan"
  where
+  fieldsOf message = case toRos message of
+    Object fields -> sort (map Key.toText (KeyMap.keys fields))
+    _ -> []
   numbers = topic "/numbers" latched :: Topic (Std Int32)
   say robot n = publish robot "/numbers" (toRos (Std (n :: Int32)))
   withRobot act = underSchedules 40 . withFakeRobot [] $ \robot ->

@@ -206,7 +206,7 @@ report (Observer here _ cell) next = mask_ $ do
 -- nothing. Without a trace it does nothing.
 noticed :: String -> [Change] -> IO ()
 noticed name changes =
-  myPlace >>= traverse_ (\here -> mask_ (reportNoticed name changes here))
+  myPlace >>= traverse_ (mask_ . reportNoticed name changes)
 
 reportNoticed :: String -> [Change] -> Place -> IO ()
 reportNoticed name changes here = do
