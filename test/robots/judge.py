@@ -394,23 +394,26 @@ def row_13():
 
 
 def row_15():
+    # A list for each of the five turns: a machine is faster in one than in the next, so the ratio is taken in each.
     took = collections.defaultdict(list)
     for entry in believed[15]:
         for what, seconds in entry.get("took", {}).items():
-            took[entry["client"], what] += seconds
+            took[entry["client"], what].append(seconds)
     for what, other, most in ("message", "roslibpy", 1), ("goal", "roslibpy", 1), ("cancel", "roslibpy", 1), (
             "reaction", "bare", 1.5):
         ours, theirs = took["ours", what], took[other, what]
-        wanted = 200 if what == "cancel" else 1000
-        if not len(ours) == len(theirs) == wanted:
-            claim(15, f"{what}: measured, ours and {other}", f"{len(ours)} and {len(theirs)}", wanted, False)
+        wanted = 5 * [40 if what == "cancel" else 200]
+        if not list(map(len, ours)) == list(map(len, theirs)) == wanted:
+            claim(15, f"{what}: measured, ours and {other}", f"{list(map(len, ours))} and {list(map(len, theirs))}",
+                  wanted, False)
             continue
-        mine, its = statistics.median(ours), statistics.median(theirs)
-        claim(15, f"{what}: ours {mine * 1e6:.0f} us, {other} {its * 1e6:.0f} us (median): ratio", f"{mine / its:.2f}",
-              f"at most {most}", mine <= most * its)
+        mine, its = list(map(statistics.median, ours)), list(map(statistics.median, theirs))
+        ratio = statistics.median(a / b for a, b in zip(mine, its))
+        claim(15, f"{what}: ours {statistics.median(mine) * 1e6:.0f} us, {other} {statistics.median(its) * 1e6:.0f} us"
+              " (medians): ratio", f"{ratio:.2f}", f"at most {most}", ratio <= most)
     watched = took["ours", "reaction to a topic that must not be silent"]
     if watched:
-        print(f"row 15: a reaction to a topic that must not be silent: {statistics.median(watched) * 1e6:.0f} us")
+        print(f"row 15: a reaction to a topic that must not be silent: {statistics.median(sum(watched, [])) * 1e6:.0f} us")
 
 
 def row_16():
