@@ -212,7 +212,8 @@ spec = guarded $ do
         awaitUp ros
         _ <- tried (stopAfter 10 (carrying ros "cup"))
         sleep 60
-      [(name, began, end) | (name, began, end, Succeeded) <- spansOf run] `shouldBe` [("may still move: /carry", 12, 60)]
+      [(name, began, end) | (name, began, end, Succeeded) <- spansOf run]
+        `shouldBe` [("may still move: /carry", 12, 60)]
       [(time, outside, changes) | ("goal", time, outside, changes) <- noticedIn run, time > 0]
         `shouldBe` [(12, ["may still move: /carry"], [Change "id" Nothing "goal 1"])]
     it "so is one whose link was lost, until the robot says that it runs no longer" $ do
@@ -221,7 +222,8 @@ spec = guarded $ do
         let losing = sleep 10 >> loseLink robot >> sleep 5 >> restoreLink robot >> sleepForever
         _ <- firstOf [losing, tried (carrying ros "cup")]
         sleep 5 >> restoreLink robot >> sleep 60
-      [(name, began, end) | (name, began, end, Succeeded) <- spansOf run] `shouldBe` [("may still move: /carry", 10, 60)]
+      [(name, began, end) | (name, began, end, Succeeded) <- spansOf run]
+        `shouldBe` [("may still move: /carry", 10, 60)]
 
 -- | An action whose goals and results are numbers.
 data Counting

@@ -413,7 +413,8 @@ def row_15():
               " (medians): ratio", f"{ratio:.2f}", f"at most {most}", ratio <= most)
     watched = took["ours", "reaction to a topic that must not be silent"]
     if watched:
-        print(f"row 15: a reaction to a topic that must not be silent: {statistics.median(sum(watched, [])) * 1e6:.0f} us")
+        typical = statistics.median(sum(watched, []))
+        print(f"row 15: a reaction to a topic that must not be silent: {typical * 1e6:.0f} us")
 
 
 def row_16():
