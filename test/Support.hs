@@ -14,7 +14,6 @@ module Support
   , within
   , leavingNothing
   , onOneCapability
-  , sampleOf
   , sampling
 
     -- * Gates
@@ -72,7 +71,7 @@ import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
 import Control.Monad (replicateM_, unless)
 import Data.Foldable (for_, traverse_)
-import Data.Maybe (isNothing)
+import Data.Maybe (isJust, isNothing)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import System.Environment (lookupEnv)
 import System.Mem.Weak (deRefWeak)
@@ -131,16 +130,13 @@ leavingNothing act = mask $ \restore -> do
 onOneCapability :: IO a -> IO a
 onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCapabilities . const
 
--- | That many of what is tried at random where all tests run under all runtimes (the variable @EVERYWHERE@ is set, as
--- in CI), and a tenth of them otherwise.
-sampleOf :: Int -> IO Int
-sampleOf whole = maybe (whole `div` 10) (const whole) <$> lookupEnv "EVERYWHERE"
-
--- | Tries as many random inputs as 'sampleOf' says. With @--qc-max-success@, that many of what is cheapest: the number
--- here is the share of it, in 3,000.
+-- | Tries that many random inputs where all tests run under all runtimes (the variable @EVERYWHERE@ is set, as in
+-- CI), and a third of them otherwise. With @--qc-max-success@, that many of what is cheapest: the number here is
+-- the share of it, in 3,000.
 sampling :: Int -> Spec -> Spec
 sampling share tests = do
-  least <- runIO (sampleOf share)
+  everywhere <- runIO (isJust <$> lookupEnv "EVERYWHERE")
+  let least = if everywhere then share else share `div` 3
   modifyMaxSuccess (\asked -> max least (asked * share `div` 3000)) tests
 
 -- | Blocks the threads that pass it until it is opened; it is never closed again.

@@ -39,12 +39,13 @@ spec = guarded $ do
 
   it "gives the unit back after the cleanup of the behaviour" $ do
     semaphore <- atomically (newTSem 1)
-    entries <- newLog
+    wasFree <- newLog
     isHeld <- newGate
+    let noteFree = isFree semaphore >>= note wasFree
     timeout 0 (withTSem semaphore hang) ? pure ()
-    withTSem semaphore ((open isHeld >> hang) `uninterruptibly` note entries 'a') ||| pass isHeld
-    withTSem semaphore (note entries 'b')
-    notes entries `shouldReturn` "ab"
+    withTSem semaphore ((open isHeld >> hang) `uninterruptibly` noteFree) ||| pass isHeld
+    noteFree
+    notes wasFree `shouldReturn` [False, True]
 
   describe "With a limit on the waiting alone no unit is lost to a cancellation as it is given," $ do
     it "under all schedules, if the grant is noted" $

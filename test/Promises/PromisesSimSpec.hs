@@ -11,7 +11,6 @@ import Test.Hspec
 import Promises.Properties
 import Promises.Stage
 import Promises.Trying
-import Support (sampleOf)
 
 spec :: Spec
 spec = do
@@ -21,10 +20,9 @@ spec = do
         modifyIORef' explored (<> t)
         schedulesExplored t `shouldSatisfy` (>= needed)
       counted = readIORef explored >>= \t -> putStrLn ("  (explored: " ++ show t ++ ")")
-  random <- runIO (sampleOf randomSchedules)
   afterAll_ counted . forM_ promises $ \promise -> describe (promised promise) $ do
     it "under random schedules" $
-      counting random (underRandom 1 random promise)
+      counting randomSchedules (underRandom 1 randomSchedules promise)
     it "under all schedules of small programs, with up to two pre-emptions" $
       counting smallPrograms (underAll 1 2 100000 smallPrograms promise)
     it "in reality" $

@@ -85,7 +85,7 @@ data Ros = Ros
   , sent :: TVar (Map Id Sent)
   -- ^ The goals that may still run.
   , newlyLeft :: TQueue (Id, Text)
-  -- ^ Those of them that nothing waits for since then, and their actions, until a trace shows them.
+  -- ^ Those of them that nothing waits for any more, with their actions, until a trace shows them.
   , calls :: TVar (Map Id (TVar (Maybe Reply)))
   -- ^ The calls that wait for their answer.
   , advertised :: TVar (Map Text Advertised)
