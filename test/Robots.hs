@@ -26,6 +26,7 @@ import Robots.Cost
 import Robots.Lies
 import Robots.Losing
 import Robots.Missions
+import Robots.Navigating
 import Robots.Topics
 
 rows :: [(Row, Campaign -> Behavior ())]
@@ -44,6 +45,7 @@ rows =
   , (13, twoRobots)
   , (15, costs)
   , (16, agreeing)
+  , (17, navigating)
   ]
 
 main :: IO ()

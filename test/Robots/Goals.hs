@@ -11,6 +11,7 @@ module Robots.Goals
   , uninterrupted
   , interrupted
   , awaitServers
+  , awaitReached
   ) where
 
 import Control.Exception (SomeAsyncException, SomeException, displayException, fromException, throwIO, try)
@@ -89,15 +90,18 @@ interrupted campaign row more instant send = do
 -- link of their own, and their orders are not written.)
 awaitServers :: Campaign -> Row -> Transport -> [String] -> Behavior ()
 awaitServers campaign row bridge names =
-  withRosWith defaultRosOptions {patience = 0.1} bridge $ \ros -> for_ names $ \name -> do
+  awaitReached campaign row bridge
+    [(name, \ros reach -> untilFeedback ros (replacing (fibonacci name)) reach) | name <- names]
+
+-- | The same for any servers: each with what sends it a goal, and runs that behaviour when its feedback comes.
+awaitReached :: Campaign -> Row -> Transport -> [(String, Ros -> Behavior () -> Sending)] -> Behavior ()
+awaitReached campaign row bridge servers =
+  withRosWith defaultRosOptions {patience = 0.1} bridge $ \ros -> for_ servers $ \(name, send) -> do
     reached <- newTVarIO False
     let reach = atomically (writeTVar reached True)
         go n = do
           order <- newOrder campaign
-          _ <- tryAny . timeout 0.3 $ firstOf
-            [ void (untilFeedback ros (replacing (fibonacci name)) reach order)
-            , atomically (readTVar reached >>= check)
-            ]
+          _ <- tryAny . timeout 0.3 $ firstOf [void (send ros reach order), atomically (readTVar reached >>= check)]
           there <- readTVarIO reached
           unless there (if n < 50 then go (n + 1) else failWith ("no goal reaches " ++ name))
           when there (note campaign row ["server" .= name, "lost by the bridge" .= (n - 1 :: Int)])
