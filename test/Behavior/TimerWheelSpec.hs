@@ -181,13 +181,14 @@ many = do
           replicateM_ (n `mod` 7) yield
       when (n `mod` 10 == 0) $ sleepBetween t (t + 0.003)
 
-  -- (At each time a thread sleeps, so that one armed timer expires again and again.)
+  -- (At each time a thread sleeps, so that one armed timer expires again and again. The steps after the last
+  -- measurement are there so that it has not ended.)
   it "use an armed timer that needs no more memory the longer it is in use" $
     growingByLessThan 20000 400 $ \step -> do
       t <- getMonotonicTime
       forConcurrently_ [1 .. 40] $ \k -> do
         sleepBetween t (t + k / 1000) >> step
-        replicateM_ 9 $ do
+        replicateM_ 10 $ do
           t' <- getMonotonicTime
           sleepBetween t' (t' + 0.04) >> step
 

@@ -74,7 +74,7 @@ spec = guarded $ do
       say robot 1
       sleep 1
       atomically (unhandled inbox) >>= (`shouldBe` 0)
-    it "may be larger where the topic allows it" . withRobot $ \robot ros -> do
+    it "may be larger where the topic allows it" . withRobotUnder 4 $ \robot ros -> do
       let texts = topic "/texts" latched :: Topic (Std Text)
           large name = publish robot name (object ["data" .= Text.replicate 1200000 "x"]) >> sleep 1
           comes t = isJust <$> stopAfter 1 (Signal.read (latest ros t))
@@ -147,7 +147,8 @@ spec = guarded $ do
     _ -> []
   numbers = topic "/numbers" latched :: Topic (Std Int32)
   say robot n = publish robot "/numbers" (toRos (Std (n :: Int32)))
-  withRobot act = underSchedules 40 . withFakeRobot [] $ \robot ->
+  withRobot = withRobotUnder 40
+  withRobotUnder schedules act = underSchedules schedules . withFakeRobot [] $ \robot ->
     withRosWith defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
   tried :: Behavior a -> Behavior (Either RosFault a)
   tried = try
