@@ -107,7 +107,8 @@ parents = do
       begun <- newGate
       named "task" (Support.open begun >> hang) `finally` named "cleanup" (pure ()) ||| pass begun
       named "try" failed ? named "recover" (pure ())
-      timeout 0.001 (hang `onException` cleanupWithin 1 (named "park" (pure ()))) ? pure ()
+      hanging <- newGate
+      (Support.open hanging >> hang) `onException` cleanupWithin 1 (named "park" (pure ())) ||| pass hanging
     for_ ["read", "task", "cleanup", "try", "recover", "park"] $ \name ->
       parentsOf seen `shouldContain` [(name, Just "outer")]
     checkSpans seen
@@ -221,9 +222,10 @@ causes = do
     over <- newGate
     living <- liveThreadCount
     (_, seen) <- traceOf . named "outer" $ do
-      let stuck = named "stuck" (named "deep" (pass mayEnd)) >> named "later" (pure ()) >> Support.open over
-      timeout 0.001 (abandoning 0.001 (uninterruptibleMask_ stuck))
-        ? pure ()
+      begun <- newGate
+      let deep = named "deep" (Support.open begun >> pass mayEnd)
+          stuck = named "stuck" deep >> named "later" (pure ()) >> Support.open over
+      abandoning 0.001 (uninterruptibleMask_ stuck) ||| pass begun
       Support.open mayEnd
       pass over
     [(spanName s, c) | Ended s _ (StoppedBy c) <- seen] `shouldBe` [("deep", WasAbandoned), ("stuck", WasAbandoned)]
@@ -236,8 +238,10 @@ causes = do
     over <- newGate
     living <- liveThreadCount
     (_, seen) <- traceOf . named "outer" $ do
-      let inner = abandoning 0.01 (uninterruptibleMask_ (named "deep" (pass mayEnd))) `finally` Support.open over
-      timeout 0.001 (abandoning 0.001 inner) ? pure ()
+      begun <- newGate
+      let deep = named "deep" (Support.open begun >> pass mayEnd)
+          inner = abandoning 0.01 (uninterruptibleMask_ deep) `finally` Support.open over
+      abandoning 0.001 inner ||| pass begun
       pass over
     [(spanName s, c) | Ended s _ (StoppedBy c) <- seen] `shouldBe` [("deep", WasAbandoned)]
     checkSpans seen
