@@ -26,8 +26,10 @@ libraries=(
   ansi-terminal:libghc-ansi-terminal-dev
   async:libghc-async-dev
   base64-bytestring:libghc-base64-bytestring-dev
+  file-embed:libghc-file-embed-dev
   HsOpenSSL:libghc-hsopenssl-dev
   hspec:libghc-hspec-dev
+  http-types:libghc-http-types-dev
   HUnit:libghc-hunit-dev
   network:libghc-network-dev
   optparse-applicative:libghc-optparse-applicative-dev
@@ -36,6 +38,9 @@ libraries=(
   svg-builder:libghc-svg-builder-dev
   terminal-size:libghc-terminal-size-dev
   unliftio-core:libghc-unliftio-core-dev
+  wai:libghc-wai-dev
+  wai-websockets:libghc-wai-websockets-dev
+  warp:libghc-warp-dev
   websockets:libghc-websockets-dev
 )
 debian_packages=(ghc cabal-install "${libraries[@]#*:}")
@@ -199,12 +204,17 @@ build_libraries() {
     cabal*) run_cabal build --enable-tests --only-dependencies all >&2 ;;
     stack*) run_stack build --test --only-dependencies >&2 ;;
   esac
-  build lib:behavior-lang lib:json lib:quickcheck lib:ros lib:unliftio lib:viewer
+  build lib:behavior-lang lib:json lib:live lib:live-page lib:quickcheck lib:ros lib:unliftio lib:viewer
 }
 
 # stanza NAME: the lines of this common stanza of the package description.
 stanza() {
   sed -n "/^common $1\$/,/^\$/p" behavior-lang.cabal
+}
+
+# The folders of the libraries, as options of GHC.
+library_folders() {
+  awk '/^library/ { on = 1 } on && /hs-source-dirs:/ { print "-i" $2; on = 0 }' behavior-lang.cabal
 }
 
 # The folders of the tests, and of the examples that they compile, as options of GHC.

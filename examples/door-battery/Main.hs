@@ -10,8 +10,8 @@ import System.Exit (exitWith)
 import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
+import Behavior.Live (viewEvents, viewing)
 import Behavior.Sim (Schedule (..))
-import Behavior.Trace.Viewing (viewEvents, viewing)
 import Exploration
 import Mission
 import Options

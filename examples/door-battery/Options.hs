@@ -12,10 +12,11 @@ module Options
 import Control.Monad (mfilter)
 import Data.Char (isDigit)
 import Data.List (intercalate, stripPrefix)
+import Data.Maybe (isJust)
 import Options.Applicative
 import Text.Read (readMaybe)
 
-import Behavior.Trace.Viewing (Viewing, defaultViewing)
+import Behavior.Live (Viewing (livePage), defaultViewing)
 import ViewingOptions (viewingOptions)
 import World (DoorState (..))
 
@@ -60,7 +61,10 @@ parse arguments = execParserPure defaultPrefs commandLine arguments >>= checked
           \threshold of its own; allowed: " ++ show printedThreshold
     | Explored _ <- mode o
     , shown o /= defaultViewing =
-        refuse "options --trace, --timeline and --tree show one mission; allowed: without --explore"
+        refuse "options --trace, --timeline, --tree and --live show one mission; allowed: without --explore"
+    | Simulated _ <- mode o
+    , isJust (livePage (shown o)) =
+        refuse "option --live shows a mission while it runs; allowed: without --simulate"
     | otherwise = pure o
   refuse why = Failure (parserFailure defaultPrefs commandLine (ErrorMsg why) [])
 
@@ -103,7 +107,7 @@ options =
         , help "vary the length of every action but recharge by up to 20 %, each N in its own way"
         ])
     <*> (simulation <|> exploration <|> pure Really)
-    <*> viewingOptions
+    <*> viewingOptions "door-battery"
  where
   simulation =
     flag' Simulated (long "simulate" <> help "the same in virtual time: the whole report is printed at once")

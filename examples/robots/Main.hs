@@ -5,17 +5,19 @@ module Main (main) where
 import Control.Exception (ErrorCall (..), onException, throwIO)
 import Control.Monad (forever, void, when)
 import Data.List (intercalate)
+import Data.Maybe (isJust)
 import Options.Applicative
+import System.Exit (die)
 import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
+import Behavior.Live (Viewing (..), viewEvents, viewing)
 import Behavior.Message (withInbox)
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (Outcome (Returned), Run (..), defaultSimOptions, endAt, explain, simulateWith)
 import Behavior.Sim.Mock (begin, condition, driver, newMock, set, signal)
 import Behavior.Trace (named)
-import Behavior.Trace.Viewing (Viewing (..), viewEvents, viewing)
 import Drone (Drone (Drone), drone)
 import qualified Drone
 import Fleet (Fleet (Fleet), Robot (Robot), fleet)
@@ -29,6 +31,8 @@ main :: IO ()
 main = do
   hSetBuffering stdout LineBuffering
   o <- customExecParser defaultPrefs commandLine
+  when (inSimulation o && isJust (livePage (shown o))) $
+    die "robots: option --live shows a robot while it runs; allowed: without --simulate"
   let mission = named "mission" (demo o putStrLn) >> putStrLn "the demo is over"
   runBehavior $
     if inSimulation o
@@ -57,7 +61,7 @@ commandLine =
     Options
       <$> argument (eitherReader chosen) (metavar "ROBOT" <> help names)
       <*> switch (long "simulate" <> help "run it in virtual time")
-      <*> viewingOptions
+      <*> viewingOptions "robot"
   chosen name = maybe (Left ("not a robot: " ++ show name ++ "; allowed: " ++ names)) Right (lookup name demos)
   names = intercalate ", " (map fst demos)
 

@@ -7,8 +7,8 @@ import System.Exit (ExitCode (..), exitWith)
 import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
+import Behavior.Live (viewing)
 import Behavior.Ros
-import Behavior.Trace.Viewing (viewing)
 import RosMission
 import ViewingOptions (viewingOptions)
 
@@ -27,7 +27,7 @@ main = do
         <> failureCode 2
         <> progDesc "A robot must enter a room by one of two doors and do its task there, and never run out of battery."
         <> footer "Exit status: 0 when the task is done, 1 when the robot failed, 2 for bad options, 3 for a fault."
-  options = (,) <$> address <*> viewingOptions
+  options = (,) <$> address <*> viewingOptions "ros-mission"
   address =
     strOption $
       long "bridge" <> metavar "ADDRESS" <> value "ws://127.0.0.1:9090" <> showDefault <> help "of a rosbridge"

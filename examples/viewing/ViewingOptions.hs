@@ -4,14 +4,16 @@ module ViewingOptions
   ( viewingOptions
   ) where
 
-import Behavior.Trace.Viewing (Viewing (..))
+import Behavior.Live (LivePage (robot), Viewing (..), loopback)
 import Options.Applicative
 
-viewingOptions :: Parser Viewing
-viewingOptions =
+-- | Of the robot with this name.
+viewingOptions :: String -> Parser Viewing
+viewingOptions name =
   Viewing
     <$> file "trace" "write the events of the run to this file; behavior-trace shows it"
     <*> file "timeline" "draw the run as an SVG file"
     <*> switch (long "tree" <> help "show what runs as a tree, below the lines that are printed")
+    <*> optional (flag' loopback {robot = name} (long "live" <> help "serve a page that shows it in a browser"))
  where
-  file name what = optional (strOption (long name <> metavar "FILE" <> help what))
+  file this what = optional (strOption (long this <> metavar "FILE" <> help what))

@@ -1,0 +1,502 @@
+"use strict";
+// The live page: reads the robot's messages (docs/live-protocol.md), and shows what they say. Texts are set when a
+// message comes, for a hidden tab draws no frames; only the bars wait for a frame.
+
+const mostSpans = 20000; // that have ended
+const mostReactions = 2000;
+const mostRows = 300; // in a list
+const mostSeconds = 60; // of the timeline
+const $ = (id) => document.getElementById(id);
+
+// --- What is known ----------------------------------------------------------
+
+let run = null; // from "hello"
+let spans = new Map(); // by number, in the order in which they came
+let reactions = []; // the oldest first
+let stoppedBy = new Map(); // the outermost named span that a reaction stopped, by the reaction's number
+let startedBy = new Map(); // the first one that it started
+let next = null; // the number of the event that comes next, when one is known
+let lost = 0; // by the robot
+let missed = 0; // events of which only the summary came
+let robotTime = 0; // of the last message that has one
+let heardAt = 0; // when any message came, by this page's clock
+let since = null; // when it was disconnected
+let isOver = false;
+let refusal = null;
+
+const outcomeOf = (span) => (span.end ? span.end.how : "running");
+const marks = { running: "▶", succeeded: "✓", failed: "✗", faulted: "‼", stopped: "■" };
+
+function forget() {
+  spans = new Map();
+  stoppedBy = new Map();
+  startedBy = new Map();
+  reactions = [];
+  next = null;
+  lost = missed = robotTime = 0;
+  isOver = false;
+}
+
+function learn(event) {
+  if (event.event === "began" || event.event === "ended") {
+    const { event: _, ...span } = event;
+    spans.delete(span.number); // what has ended last comes last
+    spans.set(span.number, span);
+    if (span.kind === "named") {
+      const cause = span.end?.cause;
+      if (cause?.why === "signal" && !(stoppedBy.get(cause.reaction)?.number < span.number)) {
+        stoppedBy.set(cause.reaction, span);
+      }
+      if (span.reaction !== undefined && !startedBy.has(span.reaction)) startedBy.set(span.reaction, span);
+    }
+    at(span.ended ?? span.began);
+  } else if (event.event === "reacted") {
+    reactions.push(event);
+    at(event.time);
+  }
+}
+
+function at(time) {
+  if (typeof time === "number") robotTime = Math.max(robotTime, time);
+}
+
+function forgetOldest() {
+  if (reactions.length > mostReactions) reactions.splice(0, reactions.length - mostReactions);
+  for (const known of [stoppedBy, startedBy]) {
+    for (const number of known.keys()) {
+      if (known.size <= mostReactions) break;
+      known.delete(number);
+    }
+  }
+  if (spans.size <= mostSpans) return;
+  let surplus = spans.size - mostSpans;
+  for (const span of spans.values()) {
+    if (surplus <= 0) break;
+    if (span.end) {
+      spans.delete(span.number);
+      surplus--;
+    }
+  }
+}
+
+// --- Messages ---------------------------------------------------------------
+
+function connect() {
+  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+  socket.onopen = () => {
+    const attach = { version: 1 };
+    if (location.hash.length > 1) attach.token = token(location.hash.slice(1));
+    if (next !== null) Object.assign(attach, { run: run.run, next });
+    socket.send(JSON.stringify(attach));
+  };
+  socket.onmessage = ({ data }) => {
+    heardAt = performance.now();
+    since = null;
+    receive(JSON.parse(data));
+    show();
+  };
+  socket.onclose = () => {
+    if (!isOver && !refusal) since ??= new Date();
+    show();
+    if (!refusal) setTimeout(connect, 1000);
+  };
+}
+
+function token(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text; // no address that the robot has printed
+  }
+}
+
+function receive(message) {
+  switch (message.message) {
+    case "hello":
+      refusal = null;
+      if (run && run.run !== message.run) forget();
+      isOver = false;
+      run = message;
+      break;
+    case "snapshot":
+      if (next !== null) missed += Math.max(0, message.next - next);
+      next = message.next;
+      spans = new Map([...spans].filter(([, span]) => span.end));
+      for (const event of [...message.ended, ...message.running]) learn(event);
+      reactions = reactions.filter((r) => message.reacted.every((s) => s.number !== r.number));
+      for (const event of message.reacted) learn(event);
+      break;
+    case "events":
+      message.events.forEach(learn);
+      next = message.next;
+      break;
+    case "over":
+      isOver = true;
+      break;
+    case "refused":
+      refusal = message.why;
+      break;
+  }
+  if (message.lost !== undefined) lost = message.lost;
+  at(message.now);
+  forgetOldest();
+}
+
+// A robot that is stopped closes nothing: it only falls silent.
+setInterval(() => {
+  if (run && !since && !isOver && performance.now() - heardAt > 900) {
+    since = new Date(Date.now() - (performance.now() - heardAt));
+    show();
+  }
+}, 200);
+
+// --- What is shown ----------------------------------------------------------
+
+let pausedAt = null; // the time that is shown; null: the present
+let selected = null; // the number of a span
+const inertly = /[\p{Cc}\p{Cf}\p{Cs}\p{Co}\p{Zl}\p{Zp}]/gu;
+
+// A text of the robot's, on one line and of bounded length; nothing in it can act.
+function inert(text, most = 200) {
+  const short = text.length > most ? text.slice(0, most) + "…" : text;
+  return short.replace(inertly, (c) => `\\u{${c.codePointAt(0).toString(16)}}`);
+}
+
+const during = (time) => (time < 10 ? time.toFixed(1) : Math.round(time).toString()) + " s";
+const shownTime = () => pausedAt ?? robotTime;
+const runsAt = (span, time) => span.began <= time && (!span.end || span.ended > time);
+const wanted = (span) => {
+  const word = $("search").value.trim().toLowerCase();
+  const outcome = $("outcome").value;
+  return (!word || span.name.toLowerCase().includes(word)) && (!outcome || outcomeOf(span) === outcome);
+};
+
+function pathOf(span) {
+  const names = [];
+  for (let s = span; s && names.length < 50; s = spans.get(s.parent)) names.unshift(inert(s.name, 60));
+  return names;
+}
+
+function element(name, texts = [], attributes = {}) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...texts);
+  return made;
+}
+
+// Rows that stay: their texts change, and so the focus stays where it is.
+function fill(list, items, make, write) {
+  const known = new Map([...list.children].map((row) => [row.dataset.key, row]));
+  let before = null;
+  for (const [key, item] of items) {
+    let row = known.get(key);
+    if (!row) {
+      row = make(item);
+      row.dataset.key = key;
+    }
+    known.delete(key);
+    const here = before ? before.nextSibling : list.firstChild;
+    if (here !== row) list.insertBefore(row, here);
+    write(row, item);
+    before = row;
+  }
+  for (const row of known.values()) row.remove();
+}
+
+function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+// Each row about a span has a button, which shows its details.
+function spanRow() {
+  const button = element("button", [], { type: "button", class: "span" });
+  const row = element("li", [button, element("span", [], { class: "age" })]);
+  button.addEventListener("click", () => {
+    selected = Number(row.dataset.number);
+    show();
+  });
+  return row;
+}
+
+function writeSpan(row, span, more) {
+  const outcome = outcomeOf(span);
+  row.dataset.number = span.number;
+  row.firstChild.className = `span ${outcome}` + ($("search").value.trim() && wanted(span) ? " found" : "");
+  setText(row.firstChild, `${marks[outcome]} ${inert(span.name)}`);
+  setText(row.lastChild, ` ${more}`);
+}
+
+function show() {
+  const time = shownTime();
+  showState(time);
+  showTree(time);
+  showInterruptions(time);
+  showFailures(time);
+  showSignals(time);
+  showBars(time);
+  showDetails();
+  askForFrame();
+}
+
+function showState(time) {
+  const name = run ? inert(run.robot, 80) : "robot";
+  setText($("robot"), name);
+  if (document.title !== name) document.title = name;
+  document.body.classList.toggle("disconnected", Boolean(since || refusal || isOver));
+  setText(
+    $("state"),
+    refusal ? `refused: ${inert(refusal)}`
+      : since ? `disconnected since ${since.toTimeString().slice(0, 8)}`
+        : isOver ? "the run is over"
+          : !run ? "connecting"
+            : pausedAt !== null ? "paused" : "live");
+  setText($("shown"), `at ${time.toFixed(1)} s`);
+  const told = [];
+  if (lost > 0) told.push(`the trace has lost ${lost} events`);
+  if (missed > 0) told.push(`gap: of ${missed} events only a summary came`);
+  setText($("told"), told.join("; "));
+  $("pause").setAttribute("aria-pressed", String(pausedAt !== null));
+  setText($("pause"), pausedAt === null ? "Pause" : "Go on");
+  if (pausedAt === null) $("time").value = $("time").max;
+}
+
+function showTree(time) {
+  const rows = [];
+  const shown = [...spans.values()].filter((s) => s.kind === "named" && runsAt(s, time));
+  shown.sort((a, b) => a.number - b.number);
+  const inside = new Map();
+  const numbers = new Set(shown.map((s) => s.number));
+  const outer = (span) => {
+    let parent = span.parent;
+    for (let i = 0; i < 50 && spans.has(parent) && !numbers.has(parent); i++) parent = spans.get(parent).parent;
+    return numbers.has(parent) ? parent : 0;
+  };
+  for (const span of shown) {
+    const p = outer(span);
+    if (!inside.has(p)) inside.set(p, []);
+    inside.get(p).push(span);
+  }
+  const walk = (p, depth) => {
+    for (const span of inside.get(p) ?? []) {
+      if (rows.length < mostRows) rows.push([String(span.number), { span, depth }]);
+      walk(span.number, depth + 1);
+    }
+  };
+  walk(0, 0);
+  fill($("tree"), rows, spanRow, (row, { span, depth }) => {
+    writeSpan(row, { ...span, end: undefined }, `for ${during(time - span.began)}`);
+    row.style.paddingLeft = `${Math.min(depth, 12)}rem`;
+  });
+}
+
+function changeText(change) {
+  const was = change.before === undefined ? "" : ` (was ${inert(change.before, 60)})`;
+  return `${inert(change.signal, 60)} ${inert(change.after, 60)}${was}`;
+}
+
+function sentence(reaction) {
+  const causes = reaction.changes.map(changeText).join(" → ") || inert(reaction.operator, 60);
+  const [was, is] = [stoppedBy.get(reaction.number), startedBy.get(reaction.number)];
+  const effects = [];
+  if (reaction.stopped) {
+    effects.push(`stopped ${inert((was ?? reaction.stopped).name, 60)} after ${during(reaction.stopped.after)}`);
+  }
+  if (is || reaction.starts) effects.push(`starts ${inert(is ? is.name : reaction.starts, 60)}`);
+  return `${reaction.time.toFixed(1)} s: ${causes}: ${effects.join(", ") || "nothing starts"}`;
+}
+
+function showInterruptions(time) {
+  const some = reactions.filter((r) => r.stopped && r.time <= time).slice(-20).reverse();
+  const make = () => element("li", [], { tabindex: "0" });
+  fill($("interruptions"), some.map((r) => [String(r.number), r]), make, (row, r) => setText(row, sentence(r)));
+}
+
+function endText(end) {
+  if (!end) return "it runs";
+  if (end.how !== "stopped") return end.how + (end.text === undefined ? "" : `: ${inert(end.text)}`);
+  const cause = end.cause;
+  const why = {
+    signal: () => cause.changes.map(changeText).join(" → ") || "its signal changed",
+    "sibling finished": () => `${inert(cause.branch)} finished`,
+    "sibling failed": () => `${inert(cause.branch)} failed`,
+    "time limit": () => `its time was up (${during(cause.limit)})`,
+    "from outside": () => `from outside: ${inert(cause.exception)}`,
+    abandoned: () => "it was abandoned",
+  }[cause.why];
+  return `stopped: ${why ? why() : inert(String(cause.why))}`;
+}
+
+function showFailures(time) {
+  const isFailure = (span) => span.end && span.ended <= time && ["failed", "faulted"].includes(span.end.how);
+  const some = [...spans.values()].filter(isFailure).slice(-10).reverse();
+  fill($("failures"), some.map((s) => [String(s.number), s]), spanRow, (row, s) =>
+    writeSpan(row, s, `at ${s.ended.toFixed(1)} s ${endText(s.end)}`));
+}
+
+function showSignals(time) {
+  const values = new Map();
+  for (const r of reactions) {
+    if (r.time > time) break;
+    for (const c of r.changes) values.set(c.signal, { value: c.after, time: r.time });
+  }
+  const rows = [...values].slice(-mostRows).map(([name, v]) => [name, { name, ...v }]);
+  const cells = () => [element("th", [], { scope: "row" }), element("td"), element("td", [], { class: "age" })];
+  fill($("signals"), rows, () => element("tr", cells()), (row, v) => {
+    setText(row.children[0], inert(v.name, 60));
+    setText(row.children[1], inert(v.value, 60));
+    setText(row.children[2], `${during(time - v.time)} ago`);
+  });
+}
+
+// --- The timeline -----------------------------------------------------------
+
+let seconds = 10; // that the timeline shows
+
+function barsAt(time) {
+  let first = time;
+  for (const span of spans.values()) first = Math.min(first, span.began);
+  seconds = Math.min(mostSeconds, Math.max(10, time - first));
+  const isShown = (span) => span.kind === "named" && span.began <= time && (span.ended ?? time) >= time - seconds;
+  return [...spans.values()].filter((span) => isShown(span) && wanted(span));
+}
+
+function showBars(time) {
+  if (!$("bars").parentElement.open) return;
+  const some = barsAt(time).slice(-mostRows).reverse();
+  fill($("bars"), some.map((s) => [String(s.number), s]), spanRow, (row, s) =>
+    writeSpan(row, s, `${outcomeOf(s)}, ${s.began.toFixed(1)} s to ${s.end ? s.ended.toFixed(1) + " s" : "now"}`));
+}
+
+let frame = null;
+let drawn = []; // rectangles and their spans, for clicks
+
+function askForFrame() {
+  frame ??= requestAnimationFrame(draw);
+}
+
+function draw() {
+  frame = null;
+  const time = shownTime();
+  const canvas = $("timeline");
+  const bars = barsAt(time);
+  const lanes = new Map(); // by path
+  for (const span of bars) {
+    const path = pathOf(span).join(" / ");
+    if (!lanes.has(path)) lanes.set(path, []);
+    lanes.get(path).push(span);
+  }
+  const rows = [...lanes].sort(([a], [b]) => (a < b ? -1 : a > b ? 1 : 0)).slice(0, 60);
+  const scale = window.devicePixelRatio || 1;
+  const wide = canvas.clientWidth;
+  const high = Math.max(1, rows.length) * 18 + 4;
+  if (canvas.width !== Math.round(wide * scale) || canvas.height !== Math.round(high * scale)) {
+    canvas.width = Math.round(wide * scale);
+    canvas.height = Math.round(high * scale);
+    canvas.style.height = `${high}px`;
+  }
+  const g = canvas.getContext("2d");
+  const style = getComputedStyle(document.documentElement);
+  const colour = (name) => style.getPropertyValue(`--${name}`);
+  g.setTransform(scale, 0, 0, scale, 0, 0);
+  g.clearRect(0, 0, wide, high);
+  g.font = "12px system-ui, sans-serif";
+  drawn = [];
+  rows.forEach(([, some], i) => {
+    const top = 2 + 18 * i;
+    for (const span of some) {
+      const from = Math.max(0, ((span.began - time) / seconds + 1) * wide);
+      const to = ((Math.min(span.ended ?? time, time) - time) / seconds + 1) * wide;
+      g.fillStyle = colour(span.end && span.ended <= time ? outcomeOf(span) : "running");
+      g.fillRect(from, top, Math.max(1, to - from), 15);
+      if (to - from > 14) {
+        g.fillStyle = colour("ground");
+        g.fillText(marks[span.end && span.ended <= time ? outcomeOf(span) : "running"], from + 2, top + 12);
+      }
+      drawn.push([from, top, to, span.number]);
+    }
+    const last = some[some.length - 1];
+    g.fillStyle = colour("text");
+    g.fillText(inert(last.name, 40), 20, top + 12);
+  });
+}
+
+$("timeline").addEventListener("click", (event) => {
+  const { left, top } = event.target.getBoundingClientRect();
+  const [x, y] = [event.clientX - left, event.clientY - top];
+  const hit = drawn.filter(([from, t, to]) => x >= from - 2 && x <= to + 2 && y >= t && y < t + 18).pop();
+  if (hit) {
+    selected = hit[3];
+    show();
+  }
+});
+
+// --- Details, and what the reader asks for -----------------------------------
+
+function showDetails() {
+  const span = spans.get(selected);
+  const rows = span
+    ? [
+      ["what", pathOf(span).join(" / ")],
+      ["from", `${span.began.toFixed(3)} s`],
+      ["to", span.end ? `${span.ended.toFixed(3)} s, after ${during(span.ended - span.began)}` : "it runs"],
+      ["how", `${marks[outcomeOf(span)]} ${endText(span.end)}`],
+    ]
+    : [["", "none is chosen: choose what runs, or a bar"]];
+  if (span?.reaction !== undefined) {
+    const reaction = reactions.find((r) => r.number === span.reaction);
+    if (reaction) rows.push(["started by", sentence(reaction)]);
+  }
+  const details = $("details");
+  while (details.children.length > 2 * rows.length) details.lastChild.remove();
+  rows.forEach(([name, text], i) => {
+    if (details.children.length < 2 * i + 2) details.append(element("dt"), element("dd"));
+    setText(details.children[2 * i], name);
+    setText(details.children[2 * i + 1], text);
+  });
+}
+
+$("pause").addEventListener("click", () => {
+  pausedAt = pausedAt === null ? robotTime : null;
+  show();
+});
+
+$("time").addEventListener("input", () => {
+  let first = robotTime;
+  for (const span of spans.values()) first = Math.min(first, span.began);
+  pausedAt = first + (robotTime - first) * (Number($("time").value) / Number($("time").max));
+  show();
+});
+
+$("search").addEventListener("input", show);
+$("outcome").addEventListener("change", show);
+$("bars").parentElement.addEventListener("toggle", show);
+$("controls").addEventListener("submit", (event) => event.preventDefault());
+window.addEventListener("resize", askForFrame);
+
+// What the page holds, as a file that behavior-trace reads.
+$("save").addEventListener("click", () => {
+  if (!run) return;
+  const timed = [];
+  for (const span of spans.values()) {
+    const { ended, end, ...began } = span;
+    timed.push([span.began, 0, { event: "began", ...began }]);
+    if (end) timed.push([ended, 1, { event: "ended", ...span }]);
+  }
+  for (const r of reactions) timed.push([r.time, 2, r]);
+  timed.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const events = timed.map(([, , event]) => event);
+  if (lost + missed > 0) events.push({ event: "lost", count: lost + missed });
+  const lines = [{ format: "behavior-trace", version: 1, zero: run.zero }, ...events].map(line);
+  const link = element("a", [], { download: "run.jsonl" });
+  link.href = URL.createObjectURL(new Blob(lines, { type: "application/jsonl" }));
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+});
+
+function line(event) {
+  const unit = (c) => "\\u" + c.charCodeAt(0).toString(16).padStart(4, "0");
+  const escaped = (c) => c.split("").map(unit).join("");
+  return JSON.stringify(event).replace(/[<>&]/g, escaped).replace(inertly, escaped) + "\n";
+}
+
+connect();

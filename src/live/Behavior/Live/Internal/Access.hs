@@ -1,0 +1,76 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- The access to a live page: no other web page reads it, and beyond this machine no reader without the token.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Live.Internal.Access
+  ( isLoopback
+  , refusedHost
+  , refusedOrigin
+  , isToken
+  ) where
+
+import Data.Bits (xor, (.|.))
+import Data.ByteString (ByteString)
+import qualified Data.ByteString as Bytes
+import qualified Data.ByteString.Char8 as Char8
+import Data.Char (isDigit, toLower)
+import Data.Foldable (foldl')
+import Data.Text (Text)
+import Data.Text.Encoding (encodeUtf8)
+
+-- | Whether the name is one of this machine for itself.
+--
+-- >>> map isLoopback ["localhost", "127.0.0.1", "::1", "0.0.0.0", "127.0.0.1.example.org", "robot.local"]
+-- [True,True,True,False,False,False]
+isLoopback :: String -> Bool
+isLoopback name = map toLower name `elem` ["localhost", "::1", "[::1]"] || isFour (parts name)
+ where
+  isFour these = take 1 these == ["127"] && length these == 4 && all isByte these
+  isByte digits = not (null digits) && length digits <= 3 && all isDigit digits && (read digits :: Int) < 256
+  parts text = case break (== '.') text of
+    (part, _ : others) -> part : parts others
+    (part, []) -> [part]
+
+-- | Why a request with this header @Host@ is refused, if it is: under another name than one of this machine, a web
+-- page from elsewhere could read the answer (its author decides which address that name has). Any port is allowed:
+-- that of a tunnel is another one.
+--
+-- >>> map (maybe "allowed" (const "refused") . refusedHost . Just) ["localhost:8420", "[::1]:9000", "evil.example"]
+-- ["allowed","allowed","refused"]
+refusedHost :: Maybe ByteString -> Maybe String
+refusedHost given = case given of
+  Just host | isLoopback (Char8.unpack (withoutPort host)) -> Nothing
+  _ -> Just ("the host must be localhost, 127.0.0.1 or [::1] (use a tunnel: ssh -L), not " ++ maybe "none" show given)
+
+withoutPort :: ByteString -> ByteString
+withoutPort host
+  | "[" `Bytes.isPrefixOf` host = Char8.takeWhile (/= ']') host <> "]"
+  | otherwise = Char8.takeWhile (/= ':') host
+
+-- | Why a websocket with these headers @Host@ and @Origin@ is refused, if it is: the page that opens it must come from
+-- here. A client that is no browser sends no @Origin@, and is refused unless it will show a token.
+--
+-- >>> let refused = maybe "allowed" (const "refused")
+-- >>> [refused (refusedOrigin False (Just "localhost:8420") o) | o <- [Just "http://localhost:8420", Just "null", Nothing]]
+-- ["allowed","refused","refused"]
+-- >>> refused (refusedOrigin True (Just "localhost:8420") Nothing)
+-- "allowed"
+refusedOrigin :: Bool -> Maybe ByteString -> Maybe ByteString -> Maybe String
+refusedOrigin hasToken host origin = case origin of
+  Nothing
+    | hasToken -> Nothing
+    | otherwise -> Just "without a header Origin, a reader must show a token, and this page has none"
+  Just given
+    | given `elem` [scheme <> own | Just own <- [host], scheme <- ["http://", "https://"]] -> Nothing
+    | otherwise -> Just ("the page that reads must come from here, and not from " ++ show given)
+
+-- | Whether they are equal. How long that takes depends on the shown one's length alone.
+isToken :: Text -> Text -> Bool
+isToken token shown = Bytes.length right == Bytes.length given && differences == 0
+ where
+  (right, given) = (encodeUtf8 token, encodeUtf8 shown)
+  padded = Bytes.unpack right ++ repeat 0
+  differences = foldl' (.|.) 0 (zipWith xor padded (Bytes.unpack given))

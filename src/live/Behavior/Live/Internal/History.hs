@@ -1,0 +1,156 @@
+{-# OPTIONS_HADDOCK not-home #-}
+
+-- |
+-- What readers of a live page receive: the newest events, in chunks that are encoded once for all of them; and what
+-- someone who comes late has to know. All of it takes bounded memory, but for the spans that run.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Live.Internal.History
+  ( History
+  , noHistory
+  , add
+  , Limits (..)
+  , defaultLimits
+
+    -- * Reading
+  , Chunk (..)
+  , nextNumber
+  , lostSoFar
+  , chunksFrom
+  , Snapshot (..)
+  , snapshot
+  ) where
+
+import Data.ByteString.Builder (toLazyByteString)
+import qualified Data.ByteString.Lazy as Bytes
+import Data.Foldable (foldl', toList)
+import Data.IntMap.Strict (IntMap)
+import qualified Data.IntMap.Strict as IntMap
+import qualified Data.IntSet as IntSet
+import Data.Sequence (Seq (..), (|>))
+import qualified Data.Sequence as Seq
+
+import Behavior.Trace
+import Behavior.Trace.Format (encodeEvent)
+
+-- | The events so far, as far as they are kept. Each has a number, from 0.
+data History = History
+  { chunks :: !(Seq Chunk)
+  -- ^ The oldest first.
+  , eventsKept :: !Int
+  , bytesKept :: !Int
+  , nextNumber :: !Int
+  -- ^ The number of the next event.
+  , running :: !(IntMap Span)
+  -- ^ The spans that have not ended, by their numbers.
+  , endedLast :: !(Seq Bytes.ByteString)
+  , reactedLast :: !(Seq Bytes.ByteString)
+  , lostSoFar :: !Int
+  -- ^ How many events the trace has lost.
+  }
+
+-- | Events that readers receive together.
+data Chunk = Chunk
+  { firstNumber :: !Int
+  , afterLast :: !Int
+  , encoded :: !Bytes.ByteString
+  -- ^ The events as in a file ("Behavior.Trace.Format"), with commas between them.
+  }
+  deriving (Eq, Show)
+
+-- | How much is kept.
+data Limits = Limits
+  { mostEvents :: !Int
+  , mostBytes :: !Int
+  , mostEnded :: !Int
+  , mostReactions :: !Int
+  }
+
+-- | 20,000 events or 16 MiB, whichever is less; and 200 spans that have ended, and 200 reactions.
+defaultLimits :: Limits
+defaultLimits = Limits {mostEvents = 20000, mostBytes = 16777216, mostEnded = 200, mostReactions = 200}
+
+noHistory :: History
+noHistory = History Seq.empty 0 0 0 IntMap.empty Seq.empty Seq.empty 0
+
+-- | With one more chunk, of these events. (The newest chunk is kept, however large it is.)
+add :: Limits -> [Event] -> History -> History
+add _ [] history = history
+add limits events history =
+  forgetting limits $ (foldl' (noting limits) history (zip events lines'))
+    { chunks = chunks history |> chunk
+    , eventsKept = eventsKept history + length events
+    , bytesKept = bytesKept history + size chunk
+    , nextNumber = afterLast chunk
+    }
+ where
+  lines' = map (Bytes.init . toLazyByteString . encodeEvent) events
+  chunk = Chunk from (from + length events) $! compact (Bytes.intercalate (Bytes.singleton 44) lines')
+  from = nextNumber history
+  compact = Bytes.fromStrict . Bytes.toStrict
+
+size :: Chunk -> Int
+size = fromIntegral . Bytes.length . encoded
+
+forgetting :: Limits -> History -> History
+forgetting limits history = case chunks history of
+  oldest :<| others@(_ :<| _)
+    | eventsKept history > mostEvents limits || bytesKept history > mostBytes limits ->
+        forgetting limits history
+          { chunks = others
+          , eventsKept = eventsKept history - (afterLast oldest - firstNumber oldest)
+          , bytesKept = bytesKept history - size oldest
+          }
+  _ -> history
+
+-- What one event changes for someone who comes late.
+noting :: Limits -> History -> (Event, Bytes.ByteString) -> History
+noting limits history (event, line) = case event of
+  Began s -> history {running = IntMap.insert (spanNumber s) s (running history)}
+  Ended s _ _ -> history {running = without s, endedLast = keep (mostEnded limits) (endedLast history)}
+  Reacted _ -> history {reactedLast = keep (mostReactions limits) (reactedLast history)}
+  Lost n -> history {lostSoFar = lostSoFar history + n}
+ where
+  keep most kept = let more = kept |> line in if Seq.length more > most then Seq.drop 1 more else more
+  -- After a loss there may be spans in it whose end was lost. They have greater numbers.
+  without s
+    | lostSoFar history == 0 = IntMap.delete (spanNumber s) (running history)
+    | otherwise =
+        let (earlier, later) = IntMap.split (spanNumber s) (running history)
+         in IntMap.union earlier (outside (spanNumber s) later)
+
+-- Without those that are, by their parents, inside of the span with this number.
+outside :: Int -> IntMap Span -> IntMap Span
+outside number later = IntMap.withoutKeys later inside
+ where
+  inside = foldl' add' (IntSet.singleton number) (IntMap.elems later)
+  add' found s = case spanParent s of
+    Inside p | p `IntSet.member` found -> IntSet.insert (spanNumber s) found
+    _ -> found
+
+-- | The chunks from the event with this number on; nothing if not all of them are kept any more, or it is no number at
+-- which a chunk begins.
+chunksFrom :: Int -> History -> Maybe [Chunk]
+chunksFrom number history
+  | number == nextNumber history = Just []
+  | otherwise = case toList (Seq.dropWhileL ((< number) . firstNumber) (chunks history)) of
+      these@(first : _) | firstNumber first == number -> Just these
+      _ -> Nothing
+
+-- | What someone who comes late has to know: the beginnings of the spans that run, the last ends and the last
+-- reactions, the oldest first (each encoded).
+data Snapshot = Snapshot
+  { runningNow :: [Bytes.ByteString]
+  , lastEnded :: [Bytes.ByteString]
+  , lastReacted :: [Bytes.ByteString]
+  }
+  deriving (Eq, Show)
+
+-- | Spans that run, with those that they run in: these run, too.
+snapshot :: History -> Snapshot
+snapshot history =
+  Snapshot
+    { runningNow = map (Bytes.init . toLazyByteString . encodeEvent . Began) (IntMap.elems (running history))
+    , lastEnded = toList (endedLast history)
+    , lastReacted = toList (reactedLast history)
+    }

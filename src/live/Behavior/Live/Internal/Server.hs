@@ -1,0 +1,217 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- The server of a live page. It only shows: no message of a reader changes anything in the mission.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Live.Internal.Server
+  ( Shown (..)
+  , newShown
+  , receive
+  , publishing
+  , finish
+  , allHaveRead
+  , application
+  ) where
+
+import Control.Concurrent.Async (race_)
+import Control.Concurrent.STM
+import Control.Exception (bracket_, evaluate, handle, throwIO)
+import Control.Monad (forever, void, when)
+import qualified Data.ByteString.Lazy as Bytes
+import qualified Data.ByteString.Lazy.Char8 as Char8
+import Data.Foldable (traverse_)
+import Data.Maybe (isJust)
+import Data.Text (Text)
+import qualified Data.Text as Text
+import GHC.Clock (getMonotonicTime)
+import Network.HTTP.Types
+import Network.Wai
+import Network.Wai.Handler.WebSockets (isWebSocketsReq, websocketsApp)
+import Network.WebSockets (ConnectionOptions (..), SizeLimit (..), defaultConnectionOptions)
+import qualified Network.WebSockets as Websockets
+import System.Timeout (timeout)
+
+import Behavior.Internal.Core.Seconds (Seconds (..))
+import Behavior.Internal.Nesting (nestsDeeperThan)
+import Behavior.Internal.Spans.Event (traverseTexts)
+import Behavior.Live.Internal.Access
+import Behavior.Live.Internal.History
+import Behavior.Live.Internal.Page
+import Behavior.Live.Internal.Protocol
+import Behavior.Trace (Event)
+import Behavior.Trace.File (relativeTo)
+
+-- | What is shown, and to how many.
+data Shown = Shown
+  { run :: Run
+  , zero :: Seconds
+  -- ^ The time of 'Behavior.Time.now' at which the times of the events are 0.
+  , token :: Maybe Text
+  , onlyHere :: Bool
+  -- ^ Whether only this machine reaches it.
+  , limits :: Limits
+  , pending :: TVar [Event]
+  -- ^ Those that are in no chunk yet, the newest first.
+  , history :: TVar History
+  , isOver :: TVar Bool
+  -- ^ Whether no more events come.
+  , isComplete :: TVar Bool
+  -- ^ Whether all that have come are in chunks, too.
+  , readers :: TVar Int
+  }
+
+newShown :: Limits -> Run -> Seconds -> Maybe Text -> Bool -> IO Shown
+newShown most this start secret here =
+  Shown this start secret here most
+    <$> newTVarIO []
+    <*> newTVarIO noHistory
+    <*> newTVarIO False
+    <*> newTVarIO False
+    <*> newTVarIO 0
+
+-- | Takes the next events of the trace, when those before are in chunks (so what is too much is counted as lost by the
+-- trace). Of each text a page needs no more than its first 1,000 characters.
+receive :: Shown -> [Event] -> IO ()
+receive shown events = do
+  relative <- traverse (traverseTexts shortened . relativeTo (zero shown)) events
+  atomically $ do
+    readTVar (pending shown) >>= check . null
+    writeTVar (pending shown) (reverse relative)
+
+-- (Evaluated to its end, so that nothing longer is kept.)
+shortened :: String -> IO String
+shortened text = short <$ evaluate (length short)
+ where
+  short = case splitAt 1000 text of
+    (whole, []) -> whole
+    (some, _) -> some ++ "..."
+
+-- | Makes chunks of them, at most one in 50 ms. It ends when the run is over, and all is in chunks.
+publishing :: Shown -> IO ()
+publishing shown = do
+  (events, ends) <- atomically $ do
+    events <- readTVar (pending shown)
+    ends <- readTVar (isOver shown)
+    check (ends || not (null events))
+    (events, ends) <$ writeTVar (pending shown) []
+  before <- readTVarIO (history shown)
+  after <- evaluate (add (limits shown) (reverse events) before)
+  atomically (writeTVar (history shown) after)
+  if ends && null events
+    then atomically (writeTVar (isComplete shown) True)
+    else timeout 50000 (atomically (readTVar (isOver shown) >>= check)) >> publishing shown
+
+-- | Says that the run is over.
+finish :: Shown -> IO ()
+finish shown = atomically (writeTVar (isOver shown) True)
+
+-- | Waits until there is no reader any more.
+allHaveRead :: Shown -> IO ()
+allHaveRead shown = atomically (readTVar (readers shown) >>= check . (== 0))
+
+-- | The page, and the websocket of its readers.
+application :: Shown -> Application
+application shown request respond = case forbidden of
+  Just why -> respond (refused status403 why)
+  Nothing
+    | isWebSocketsReq request -> maybe (respond (refused status404 "the websocket is /live")) respond (reader request)
+    | requestMethod request `notElem` ["GET", "HEAD"] -> respond (refused status405 "allowed: GET")
+    | otherwise -> respond (maybe (refused status404 "there is no such file") file (pageFile (pathInfo request)))
+ where
+  header name = lookup name (requestHeaders request)
+  forbidden
+    | onlyHere shown, Just why <- refusedHost (header "Host") = Just why
+    | isWebSocketsReq request = refusedOrigin (isJust (token shown)) (header "Host") (header "Origin")
+    | otherwise = Nothing
+  reader this
+    | pathInfo this == ["live"] = websocketsApp options (accepting shown) this
+    | otherwise = Nothing
+  file (kind, content) = responseLBS status200 ((hContentType, kind) : always) (Bytes.fromStrict content)
+  refused status why =
+    responseLBS status ((hContentType, "text/plain; charset=utf-8") : always) (Char8.pack (why ++ "\n"))
+  options = defaultConnectionOptions
+    { connectionFramePayloadSizeLimit = SizeLimit 4096
+    , connectionMessageDataSizeLimit = SizeLimit 4096
+    }
+
+-- The page loads nothing from elsewhere, and is in no frame of another one.
+always :: ResponseHeaders
+always =
+  [ ( "Content-Security-Policy"
+    , "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; base-uri 'none'; \
+      \form-action 'none'; frame-ancestors 'none'"
+    )
+  , ("X-Content-Type-Options", "nosniff")
+  , ("Referrer-Policy", "no-referrer")
+  , ("Cross-Origin-Resource-Policy", "same-origin")
+  , (hCacheControl, "no-store")
+  ]
+
+-- | The greatest number of readers at a time.
+mostReaders :: Int
+mostReaders = 32
+
+-- One that does not say in time what it wants, says anything more, or does not read, is cut. (That it is gone is no
+-- error.)
+accepting :: Shown -> Websockets.ServerApp
+accepting shown waiting = handle gone $ do
+  connection <- Websockets.acceptRequest waiting
+  let say bytes = timeout 5000000 (Websockets.sendTextData connection bytes) >>= maybe tooSlow pure
+      refuse why = say (refusal why) >> ending connection
+  bracket_ (counted (+ 1)) (counted (subtract 1)) $ do
+    many <- readTVarIO (readers shown)
+    first <- timeout 5000000 (Websockets.receiveData connection)
+    case if many > mostReaders then Left tooMany else maybe (Left "nothing was said for 5 s") attach first of
+      Left why -> refuse why
+      Right wanted -> race_ (Websockets.receiveDataMessage connection) (telling shown say wanted >> ending connection)
+ where
+  gone :: Websockets.ConnectionException -> IO ()
+  gone _ = pure ()
+  tooSlow = throwIO Websockets.ConnectionClosed
+  counted f = atomically (modifyTVar' (readers shown) f)
+  tooMany = "there are " ++ show mostReaders ++ " readers, which is the most"
+  attach bytes
+    | nestsDeeperThan 10 bytes = Left "it nests too deep"
+    | otherwise = readAttach bytes >>= permitted
+  permitted wanted
+    | wantedVersion wanted /= protocolVersion =
+        Left ("version " ++ show (wantedVersion wanted) ++ " of the protocol; allowed: " ++ show protocolVersion)
+    | Just secret <- token shown
+    , maybe True (not . isToken secret) (shownToken wanted) =
+        Left "the token is another one"
+    | otherwise = Right wanted
+  -- (It ends when the reader has read all, and closes it, too.)
+  ending connection = do
+    Websockets.sendClose connection ("" :: Text)
+    void (timeout 1000000 (forever (Websockets.receiveDataMessage connection)))
+
+-- Sends a reader all that comes.
+telling :: Shown -> (Bytes.ByteString -> IO ()) -> Attach -> IO ()
+telling shown say wanted = do
+  say (hello (run shown))
+  begun <- readTVarIO (history shown)
+  cursor <- case knownUntil wanted of
+    Just (known, n) | known == Text.pack (runName (run shown)), Just _ <- chunksFrom n begun -> pure n
+    _ -> whole begun
+  follow (-1) cursor
+ where
+  -- The time of the last beat, and the number of the event to tell next.
+  follow before cursor = do
+    t <- getMonotonicTime
+    let beats = t - before >= beatEvery
+        latestBeat = if beats then t else before
+    when beats $ atTime beat =<< readTVarIO (history shown)
+    _ <- timeout (ceiling (1000000 * (latestBeat + beatEvery - t))) . atomically $ do
+      next <- nextNumber <$> readTVar (history shown)
+      complete <- readTVar (isComplete shown)
+      check (next /= cursor || complete)
+    (after, complete) <- atomically ((,) <$> readTVar (history shown) <*> readTVar (isComplete shown))
+    cursor' <- case chunksFrom cursor after of
+      Just new -> nextNumber after <$ traverse_ (say . eventsMessage) new
+      Nothing -> whole after
+    if complete then atTime over after else follow latestBeat cursor'
+  whole current = nextNumber current <$ atTime snapshotMessage current
+  atTime message current = getMonotonicTime >>= \t -> say (message (Seconds t - zero shown) current)
+  beatEvery = 0.3

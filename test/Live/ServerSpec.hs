@@ -1,0 +1,263 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- The live page over a socket of this machine.
+module Live.ServerSpec (spec) where
+
+import Control.Concurrent (yield)
+import Control.Concurrent.Async (concurrently, mapConcurrently, withAsync)
+import Control.Concurrent.STM
+import Control.Exception (Handler (..), IOException, bracket, catches, evaluate, onException, try)
+import Control.Monad (forM_, replicateM_, (>=>))
+import Data.Aeson (Value (..), eitherDecode, encode, object, (.=))
+import qualified Data.Aeson.Key as Key
+import Data.Aeson.Types (FromJSON, parseMaybe, withObject, (.:))
+import Data.Bifunctor (bimap)
+import qualified Data.ByteString.Char8 as Char8
+import qualified Data.ByteString.Lazy as Bytes
+import Data.List (isInfixOf, isPrefixOf)
+import Data.Maybe (fromMaybe)
+import Data.Text (Text)
+import qualified Data.Text as Text
+import Data.Time.Clock.POSIX (posixSecondsToUTCTime)
+import Network.Socket hiding (listen)
+import Network.Socket.ByteString (recv, sendAll)
+import Network.Wai.Handler.Warp (testWithApplication)
+import qualified Network.WebSockets as Websockets
+import System.Timeout (timeout)
+import Test.Hspec hiding (before)
+
+import Behavior.Live
+import Behavior.Live.Internal.History (defaultLimits, nextNumber)
+import Behavior.Live.Internal.Protocol
+import Behavior.Live.Internal.Server hiding (pending)
+import Behavior.Trace
+import Behavior.Trace.Format (decodeEvent)
+import Viewer.Examples (interrupted, mission)
+
+spec :: Spec
+spec = around_ (timeout 20000000 >=> maybe (expectationFailure "not over after 20 s") pure) $ do
+  describe "Access:" $ do
+    it "the page is served under this machine's names, and at any port" $ serving Nothing $ \_ port ->
+      forM_ ["localhost", "127.0.0.1:" <> Char8.pack (show port), "[::1]:9999", "LOCALHOST:1"] $
+        page port >=> (`shouldSatisfy` ("HTTP/1.1 200" `isPrefixOf`))
+    it "under another name it is refused" $ serving Nothing $ \_ port ->
+      forM_ ["evil.example", "127.0.0.1.evil.example:8420", "localhost.evil.example", ""] $
+        page port >=> (`shouldSatisfy` ("HTTP/1.1 403" `isPrefixOf`))
+    it "it loads nothing from elsewhere" $ serving Nothing $ \_ port ->
+      page port "localhost" >>= (`shouldSatisfy` ("Content-Security-Policy: default-src 'none'" `isInfixOf`))
+    it "a web page of another origin reads nothing, nor one without an origin" $ serving Nothing $ \_ port ->
+      forM_ ["http://evil.example", "null", "http://localhost:1", "http://127.0.0.1"] $ \origin ->
+        attached port [("Origin", origin)] plainly `shouldReturn` Left "403"
+    it "without an origin it needs a token" $ serving Nothing $ \_ port ->
+      attached port [] plainly `shouldReturn` Left "403"
+    it "through a tunnel at another port it is served" $ serving Nothing $ \_ port ->
+      firstFrom port [("Host", "localhost:9999"), ("Origin", "http://localhost:9999")] plainly `shouldReturn` "hello"
+    it "with a token it is for readers that show it" $ serving (Just "a secret") $ \_ port -> do
+      firstFrom port [] (object ["version" .= one, "token" .= ("a secret" :: Text)]) `shouldReturn` "hello"
+      forM_ [Nothing, Just "", Just "a secre", Just "a secret2", Just "b secret"] $ \shown ->
+        firstFrom port [] (object (("version" .= one) : ["token" .= s | Just s <- [shown :: Maybe Text]]))
+          `shouldReturn` "refused"
+    it "another version of the protocol is refused, and what is none" $ serving Nothing $ \_ port ->
+      forM_ [object ["version" .= (2 :: Int)], Null, object [], String (Text.replicate 3000 "[")] $ \said ->
+        firstFrom port (local port) said `shouldReturn` "refused"
+    it "more than 4 KiB from a reader end the connection" $ serving Nothing $ \_ port -> do
+      gave <- attached port (local port) (object ["version" .= one, "more" .= Text.replicate 5000 "x"])
+      gave `shouldBe` Left "closed"
+
+  describe "A reader" $ do
+    it "that comes late is given what runs and what was, and then what comes" $ serving Nothing $ \shown port -> do
+      let (before, later) = splitAt 9 mission
+      tell shown before
+      reading port plainly $ \connection -> do
+        ["hello", "snapshot"] `followBy` connection
+        tell shown later
+        events connection (length later) `shouldReturn` later
+    it "that comes back is given what it missed" $ serving Nothing $ \shown port -> do
+      tell shown mission
+      known <- reading port plainly $ \connection -> (,) <$> next connection <*> next connection
+      tell shown (interrupted 20)
+      let (run', n) = bimap (field "run") (field "next") known :: (Text, Int)
+          said = object ["version" .= one, "run" .= run', "next" .= n]
+      reading port said $ \connection -> do
+        ["hello"] `followBy` connection
+        events connection (length (interrupted 20)) `shouldReturn` interrupted 20
+    it "that comes back to another run, or too late, is a new one" . serving Nothing $ \shown port -> do
+      tell shown mission
+      forM_ [("another" :: Text, 0 :: Int), ("run", -1), ("run", 3), ("run", 100000)] $ \(run', n) ->
+        reading port (object ["version" .= one, "run" .= run', "next" .= n]) (["hello", "snapshot"] `followBy`)
+    it "learns that the run is over" $ serving Nothing $ \shown port -> do
+      tell shown mission
+      reading port plainly $ \connection -> do
+        finish shown
+        ["hello", "snapshot", "over"] `followBy` connection
+    it "learns three times a second that the robot is there" $ serving Nothing $ \_ port ->
+      reading port plainly $ \connection -> do
+        ["hello", "snapshot"] `followBy` connection
+        replicateM_ 4 (message <$> next' connection `shouldReturn` "beat")
+    it "that talks is cut" $ serving Nothing $ \_ port ->
+      reading port plainly $ \connection -> do
+        ["hello", "snapshot"] `followBy` connection
+        Websockets.sendTextData connection ("stop the robot" :: Text)
+        gone <- try (next connection)
+        either (const "closed" :: Websockets.ConnectionException -> String) message gone `shouldBe` "closed"
+    it "is one of 32 at most" $ serving Nothing $ \shown port -> do
+      full <- newTVarIO (0 :: Int)
+      let stays = reading port plainly $ \connection -> do
+            ["hello", "snapshot"] `followBy` connection
+            atomically (modifyTVar' full (+ 1))
+            atomically (readTVar full >>= check . (> 32))
+      withAsync (mapConcurrently (const stays) [1 .. 32 :: Int]) $ \_ -> do
+        atomically (readTVar full >>= check . (== 32))
+        firstFrom port (local port) plainly `shouldReturn` "refused"
+        atomically (writeTVar full 33)
+      allHaveRead shown
+      firstFrom port (local port) plainly `shouldReturn` "hello"
+    it "that does not read is cut, and the others go on" $ serving Nothing $ \shown port -> do
+      let flood = interrupted 20000
+      withConnection port $ \silent -> do
+        handshake silent port
+        reading port plainly $ \connection -> do
+          ["hello", "snapshot"] `followBy` connection
+          (_, count) <- concurrently (replicateM_ 4 (tell shown flood)) (countEvents connection (4 * length flood))
+          count `shouldBe` 4 * length flood
+        atomically (readTVar (readers shown) >>= check . (<= 1))
+        allHaveRead shown
+
+  describe "The behaviour" $ do
+    it "runs without a page beyond this machine, if there is no token" $
+      withLive loopback {pageHost = "0.0.0.0", pagePort = 0} (\receiving -> True <$ receiving mission)
+        `shouldReturn` True
+    it "has a page at the next port if its own is taken" $
+      withLive loopback {pagePort = 18420} $ \_ -> withLive loopback {pagePort = 18420} $ \receiving -> do
+        receiving mission
+        firstFrom 18421 (local 18421) plainly `shouldReturn` "hello"
+    it "is shown to its end" $ do
+      ready <- newEmptyTMVarIO
+      let behavior = named "wave" (atomically (takeTMVar ready))
+      (_, seen) <- concurrently
+        (viewing defaultViewing {livePage = Just loopback {pagePort = 18430}} behavior)
+        (reachable 18430 $ reading 18430 plainly $ \connection -> do
+          atomically (putTMVar ready ())
+          untilOver connection)
+      seen `shouldSatisfy` any (\m -> "\"name\":\"wave\"" `isInfixOf` m && "\"ended\"" `isInfixOf` m)
+ where
+  one = 1 :: Int
+  plainly = object ["version" .= one]
+
+-- A page with what is needed for it, and its port.
+serving :: Maybe Text -> (Shown -> Port' -> IO a) -> IO a
+serving secret use = do
+  shown <- newShown defaultLimits (Run "Ann" "run" (posixSecondsToUTCTime 0)) 0 secret True
+  withAsync (publishing shown) $ \_ -> testWithApplication (pure (application shown)) (use shown)
+
+type Port' = Int
+
+-- Returns when they are in chunks.
+tell :: Shown -> [Event] -> IO ()
+tell shown new = do
+  before <- nextNumber <$> readTVarIO (history shown)
+  receive shown new
+  atomically (readTVar (history shown) >>= check . (>= before + length new) . nextNumber)
+
+local :: Port' -> Websockets.Headers
+local port = [("Origin", Char8.pack ("http://127.0.0.1:" ++ show port))]
+
+-- Over a connection that has attached itself so.
+reading :: Port' -> Value -> (Websockets.Connection -> IO a) -> IO a
+reading port = over' port (local port)
+
+over' :: Port' -> Websockets.Headers -> Value -> (Websockets.Connection -> IO a) -> IO a
+over' port headers said use =
+  withConnection port $ \s ->
+    Websockets.runClientWithSocket s host "/live" Websockets.defaultConnectionOptions others $ \connection ->
+      Websockets.sendTextData connection (encode said) >> use connection
+ where
+  host = maybe ("127.0.0.1:" ++ show port) Char8.unpack (lookup "Host" headers)
+  others = filter ((/= "Host") . fst) headers
+
+-- The kind of the first message, or why there is none.
+attached :: Port' -> Websockets.Headers -> Value -> IO (Either String String)
+attached port headers said =
+  (Right . message <$> over' port headers said next) `catches`
+    [ Handler $ \e -> pure . Left $ case e of
+        Websockets.MalformedResponse response _ -> show (Websockets.responseCode response)
+        other -> show other
+    , Handler $ \e -> Left "closed" <$ evaluate (e :: Websockets.ConnectionException)
+    ]
+
+firstFrom :: Port' -> Websockets.Headers -> Value -> IO String
+firstFrom port headers said = either id id <$> attached port headers said
+
+-- The next message; and the next that is no beat.
+next', next :: Websockets.Connection -> IO Value
+next' connection = Websockets.receiveData connection >>= either fail pure . eitherDecode
+next connection = next' connection >>= \m -> if message m == "beat" then next connection else pure m
+
+message :: Value -> String
+message = Text.unpack . field "message"
+
+field :: FromJSON a => Text -> Value -> a
+field name = fromMaybe (error ("no field " ++ show name)) . parseMaybe (withObject "message" (.: Key.fromText name))
+
+followBy :: [String] -> Websockets.Connection -> IO ()
+followBy kinds connection = forM_ kinds $ \kind -> message <$> next connection `shouldReturn` kind
+
+-- This number of events, as they come.
+events :: Websockets.Connection -> Int -> IO [Event]
+events connection n
+  | n <= 0 = pure []
+  | otherwise = do
+      m <- next connection
+      message m `shouldBe` "events"
+      let these = map (either (error . show) id . decodeEvent . encode) (field "events" m :: [Value])
+      (these ++) <$> events connection (n - length these)
+
+countEvents :: Websockets.Connection -> Int -> IO Int
+countEvents connection n
+  | n <= 0 = pure 0
+  | otherwise = do
+      m <- next connection
+      let here = if message m == "events" then field "next" m - field "from" m else 0
+      (here +) <$> countEvents connection (n - here)
+
+untilOver :: Websockets.Connection -> IO [String]
+untilOver connection = do
+  m <- next connection
+  if message m == "over" then pure [] else (Char8.unpack (Bytes.toStrict (encode m)) :) <$> untilOver connection
+
+-- Again until there is a server.
+reachable :: Port' -> IO a -> IO a
+reachable port act = try (withConnection port (const (pure ()))) >>= either again (const act)
+ where
+  again e = evaluate (e :: IOException) >> yield >> reachable port act
+
+withConnection :: Port' -> (Socket -> IO a) -> IO a
+withConnection port = bracket open close
+ where
+  open = do
+    s <- socket AF_INET Stream defaultProtocol
+    connect s (SockAddrInet (fromIntegral port) (tupleToHostAddress (127, 0, 0, 1))) `onException` close s
+    pure s
+
+-- What the server answers to a request for the page under this name.
+page :: Port' -> Char8.ByteString -> IO String
+page port host = withConnection port $ \s -> do
+  sendAll s ("GET / HTTP/1.1\r\nHost: " <> host <> "\r\nConnection: close\r\n\r\n")
+  Char8.unpack . mconcat <$> untilClosed s
+ where
+  untilClosed s = recv s 65536 >>= \bytes -> if Char8.null bytes then pure [] else (bytes :) <$> untilClosed s
+
+-- Attaches itself, and never reads.
+handshake :: Socket -> Port' -> IO ()
+handshake s port = do
+  let host = Char8.pack ("127.0.0.1:" ++ show port)
+  setSocketOption s RecvBuffer 4096
+  sendAll s . mconcat $
+    [ "GET /live HTTP/1.1\r\nHost: ", host, "\r\nOrigin: http://", host
+    , "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    , "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    ]
+  -- (A masked frame, whose mask is zero.)
+  let said = Bytes.toStrict (encode (object ["version" .= (1 :: Int)]))
+  sendAll s (Char8.pack ['\x81', toEnum (128 + Char8.length said), '\0', '\0', '\0', '\0'] <> said)
