@@ -1,6 +1,6 @@
 -- |
 -- What is the same under each runtime: random programs under explored schedules (everything there runs in
--- simulations), and how time and memory grow.
+-- simulations), how time and memory grow, and the live page.
 module Main (main) where
 
 import Test.Hspec
@@ -17,6 +17,8 @@ import qualified Examples.ProgressProblemSpec
 import qualified Examples.RosMissionSpec
 import qualified Examples.TestingARobotSpec
 import qualified Examples.YourOwnMonadSpec
+import qualified Live.HistorySpec
+import qualified Live.ServerSpec
 import qualified Promises.PromisesSimSpec
 import qualified Ros.CallSpec
 import qualified Ros.GoalSpec
@@ -61,3 +63,6 @@ main = hspec $ do
     Behavior.SpaceSpec.spec
     Behavior.ReactiveSpaceSpec.spec
     Behavior.ScaleSpec.spec
+  describe "The live page" $ do
+    Live.HistorySpec.spec
+    Live.ServerSpec.spec

@@ -2,8 +2,6 @@ module Main (main) where
 
 import Test.Hspec
 
-import qualified Live.HistorySpec
-import qualified Live.ServerSpec
 import qualified Viewer.DiffSpec
 import qualified Viewer.FileSpec
 import qualified Viewer.FormatSpec
@@ -44,7 +42,4 @@ main = hspec $ do
   describe "Texts of others" Viewer.TextSpec.spec
   describe "Viewing" Viewer.ViewingSpec.spec
   describe "behavior-trace" Viewer.ToolSpec.spec
-  describe "The live page" $ do
-    Live.HistorySpec.spec
-    Live.ServerSpec.spec
   describe "Work" Viewer.WorkSpec.spec

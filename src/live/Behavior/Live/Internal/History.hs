@@ -70,6 +70,7 @@ data Limits = Limits
 defaultLimits :: Limits
 defaultLimits = Limits {mostEvents = 20000, mostBytes = 16777216, mostEnded = 200, mostReactions = 200}
 
+-- | Before the first event.
 noHistory :: History
 noHistory = History Seq.empty 0 0 0 IntMap.empty Seq.empty Seq.empty 0
 

@@ -62,6 +62,7 @@ data Shown = Shown
   , readers :: TVar Int
   }
 
+-- | With nothing in it: how much is kept, the run, its zero, the token, and whether only this machine reaches it.
 newShown :: Limits -> Run -> Seconds -> Maybe Text -> Bool -> IO Shown
 newShown most this start secret here =
   Shown this start secret here most
