@@ -204,12 +204,17 @@ build_libraries() {
     cabal*) run_cabal build --enable-tests --only-dependencies all >&2 ;;
     stack*) run_stack build --test --only-dependencies >&2 ;;
   esac
-  build lib:behavior-lang lib:json lib:live lib:live-page lib:quickcheck lib:ros lib:unliftio lib:viewer
+  build $(library_names)
 }
 
 # stanza NAME: the lines of this common stanza of the package description.
 stanza() {
   sed -n "/^common $1\$/,/^\$/p" behavior-lang.cabal
+}
+
+# The libraries of this package, as targets.
+library_names() {
+  awk '/^library/ { print "lib:" (NF > 1 ? $2 : "behavior-lang") }' behavior-lang.cabal
 }
 
 # The folders of the libraries, as options of GHC.

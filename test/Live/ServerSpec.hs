@@ -77,15 +77,15 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
       tell shown mission
       known <- reading port plainly $ \connection -> (,) <$> next connection <*> next connection
       tell shown (interrupted 20)
-      let (run', n) = bimap (field "run") (field "next") known :: (Text, Int)
-          said = object ["version" .= one, "run" .= run', "next" .= n]
+      let (name, n) = bimap (field "run") (field "next") known :: (Text, Int)
+          said = object ["version" .= one, "run" .= name, "next" .= n]
       reading port said $ \connection -> do
         ["hello"] `followBy` connection
         events connection (length (interrupted 20)) `shouldReturn` interrupted 20
     it "that comes back to another run, or too late, is a new one" . serving Nothing $ \shown port -> do
       tell shown mission
-      forM_ [("another" :: Text, 0 :: Int), ("run", -1), ("run", 3), ("run", 100000)] $ \(run', n) ->
-        reading port (object ["version" .= one, "run" .= run', "next" .= n]) (["hello", "snapshot"] `followBy`)
+      forM_ [("another" :: Text, 0 :: Int), ("run", -1), ("run", 3), ("run", 100000)] $ \(name, n) ->
+        reading port (object ["version" .= one, "run" .= name, "next" .= n]) (["hello", "snapshot"] `followBy`)
     it "learns that the run is over" $ serving Nothing $ \shown port -> do
       tell shown mission
       reading port plainly $ \connection -> do
@@ -94,7 +94,7 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
     it "learns three times a second that the robot is there" $ serving Nothing $ \_ port ->
       reading port plainly $ \connection -> do
         ["hello", "snapshot"] `followBy` connection
-        replicateM_ 4 (message <$> next' connection `shouldReturn` "beat")
+        replicateM_ 4 (message <$> nextOfAny connection `shouldReturn` "beat")
     it "that talks is cut" $ serving Nothing $ \_ port ->
       reading port plainly $ \connection -> do
         ["hello", "snapshot"] `followBy` connection
@@ -147,12 +147,10 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
   plainly = object ["version" .= one]
 
 -- A page with what is needed for it, and its port.
-serving :: Maybe Text -> (Shown -> Port' -> IO a) -> IO a
+serving :: Maybe Text -> (Shown -> Int -> IO a) -> IO a
 serving secret use = do
   shown <- newShown defaultLimits (Run "Ann" "run" (posixSecondsToUTCTime 0)) 0 secret True
   withAsync (publishing shown) $ \_ -> testWithApplication (pure (application shown)) (use shown)
-
-type Port' = Int
 
 -- Returns when they are in chunks.
 tell :: Shown -> [Event] -> IO ()
@@ -161,15 +159,15 @@ tell shown new = do
   receive shown new
   atomically (readTVar (history shown) >>= check . (>= before + length new) . nextNumber)
 
-local :: Port' -> Websockets.Headers
+local :: Int -> Websockets.Headers
 local port = [("Origin", Char8.pack ("http://127.0.0.1:" ++ show port))]
 
 -- Over a connection that has attached itself so.
-reading :: Port' -> Value -> (Websockets.Connection -> IO a) -> IO a
-reading port = over' port (local port)
+reading :: Int -> Value -> (Websockets.Connection -> IO a) -> IO a
+reading port = attachedBy port (local port)
 
-over' :: Port' -> Websockets.Headers -> Value -> (Websockets.Connection -> IO a) -> IO a
-over' port headers said use =
+attachedBy :: Int -> Websockets.Headers -> Value -> (Websockets.Connection -> IO a) -> IO a
+attachedBy port headers said use =
   withConnection port $ \s ->
     Websockets.runClientWithSocket s host "/live" Websockets.defaultConnectionOptions others $ \connection ->
       Websockets.sendTextData connection (encode said) >> use connection
@@ -178,22 +176,22 @@ over' port headers said use =
   others = filter ((/= "Host") . fst) headers
 
 -- The kind of the first message, or why there is none.
-attached :: Port' -> Websockets.Headers -> Value -> IO (Either String String)
+attached :: Int -> Websockets.Headers -> Value -> IO (Either String String)
 attached port headers said =
-  (Right . message <$> over' port headers said next) `catches`
+  (Right . message <$> attachedBy port headers said next) `catches`
     [ Handler $ \e -> pure . Left $ case e of
         Websockets.MalformedResponse response _ -> show (Websockets.responseCode response)
         other -> show other
     , Handler $ \e -> Left "closed" <$ evaluate (e :: Websockets.ConnectionException)
     ]
 
-firstFrom :: Port' -> Websockets.Headers -> Value -> IO String
+firstFrom :: Int -> Websockets.Headers -> Value -> IO String
 firstFrom port headers said = either id id <$> attached port headers said
 
 -- The next message; and the next that is no beat.
-next', next :: Websockets.Connection -> IO Value
-next' connection = Websockets.receiveData connection >>= either fail pure . eitherDecode
-next connection = next' connection >>= \m -> if message m == "beat" then next connection else pure m
+nextOfAny, next :: Websockets.Connection -> IO Value
+nextOfAny connection = Websockets.receiveData connection >>= either fail pure . eitherDecode
+next connection = nextOfAny connection >>= \m -> if message m == "beat" then next connection else pure m
 
 message :: Value -> String
 message = Text.unpack . field "message"
@@ -228,12 +226,12 @@ untilOver connection = do
   if message m == "over" then pure [] else (Char8.unpack (Bytes.toStrict (encode m)) :) <$> untilOver connection
 
 -- Again until there is a server.
-reachable :: Port' -> IO a -> IO a
+reachable :: Int -> IO a -> IO a
 reachable port act = try (withConnection port (const (pure ()))) >>= either again (const act)
  where
   again e = evaluate (e :: IOException) >> yield >> reachable port act
 
-withConnection :: Port' -> (Socket -> IO a) -> IO a
+withConnection :: Int -> (Socket -> IO a) -> IO a
 withConnection port = bracket open close
  where
   open = do
@@ -242,7 +240,7 @@ withConnection port = bracket open close
     pure s
 
 -- What the server answers to a request for the page under this name.
-page :: Port' -> Char8.ByteString -> IO String
+page :: Int -> Char8.ByteString -> IO String
 page port host = withConnection port $ \s -> do
   sendAll s ("GET / HTTP/1.1\r\nHost: " <> host <> "\r\nConnection: close\r\n\r\n")
   Char8.unpack . mconcat <$> untilClosed s
@@ -250,7 +248,7 @@ page port host = withConnection port $ \s -> do
   untilClosed s = recv s 65536 >>= \bytes -> if Char8.null bytes then pure [] else (bytes :) <$> untilClosed s
 
 -- Attaches itself, and never reads.
-handshake :: Socket -> Port' -> IO ()
+handshake :: Socket -> Int -> IO ()
 handshake s port = do
   let host = Char8.pack ("127.0.0.1:" ++ show port)
   setSocketOption s RecvBuffer 4096

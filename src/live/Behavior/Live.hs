@@ -21,7 +21,7 @@ module Behavior.Live
 
 import Control.Concurrent.Async (withAsync, wait)
 import Control.Exception (IOException, bracket, displayException, finally, try)
-import Control.Monad (mfilter)
+import Control.Monad (mfilter, void)
 import qualified Data.ByteString.Char8 as Char8
 import Data.Maybe (isNothing)
 import qualified Data.Text as Text
@@ -38,7 +38,7 @@ import System.Timeout (timeout)
 
 import Behavior (Behavior)
 import Behavior.Internal.Core.Seconds (Seconds (..))
-import Behavior.Live.Internal.Access (isLoopback)
+import Behavior.Internal.Loopback (isLoopback)
 import Behavior.Live.Internal.History (defaultLimits)
 import Behavior.Live.Internal.Protocol (Run (..))
 import Behavior.Live.Internal.Server
@@ -119,6 +119,8 @@ loopback = LivePage {robot = "robot", pageHost = "127.0.0.1", pagePort = 8420, p
 --
 -- > withLive loopback (\receiving -> withTrace [Batches receiving] mission)
 --
+-- It is for real time, and not for a simulation.
+--
 -- [Result, failure, fault, cancellation] Those of the action.
 --
 -- @since 0.1.0.0
@@ -130,14 +132,15 @@ withLive page use
   | otherwise = bracket (try (listening page)) closing (either (without . displayException) served)
  where
   without why = say ("no page: " ++ why) >> use (const (pure ()))
-  say text = hPutStrLn stderr ("live page: " ++ text)
+  -- (Where it cannot be printed, the action runs nevertheless.)
+  say text = void (try (hPutStrLn stderr ("live page: " ++ text)) :: IO (Either IOException ()))
   secret = mfilter (not . null) (pageToken page)
   closing :: Either IOException Socket -> IO ()
   closing = either (const (pure ())) close
   served listener = do
-    run' <- Run (robot page) <$> newName <*> getCurrentTime
+    thisRun <- Run (robot page) <$> newName <*> getCurrentTime
     begun <- Seconds <$> getMonotonicTime
-    shown <- newShown defaultLimits run' begun (Text.pack <$> secret) (isLoopback (pageHost page))
+    shown <- newShown defaultLimits thisRun begun (Text.pack <$> secret) (isLoopback (pageHost page))
     socketPort listener >>= say . ("see " ++) . address
     withAsync (publishing shown) $ \publisher ->
       withAsync (runSettingsSocket (quietly defaultSettings) listener (application shown)) $ \_ ->

@@ -6,8 +6,7 @@
 --
 -- Internal: any of it may change in any release.
 module Behavior.Live.Internal.Access
-  ( isLoopback
-  , refusedHost
+  ( refusedHost
   , refusedOrigin
   , isToken
   ) where
@@ -16,23 +15,11 @@ import Data.Bits (xor, (.|.))
 import Data.ByteString (ByteString)
 import qualified Data.ByteString as Bytes
 import qualified Data.ByteString.Char8 as Char8
-import Data.Char (isDigit, toLower)
 import Data.Foldable (foldl')
 import Data.Text (Text)
 import Data.Text.Encoding (encodeUtf8)
 
--- | Whether the name is one of this machine for itself.
---
--- >>> map isLoopback ["localhost", "127.0.0.1", "::1", "0.0.0.0", "127.0.0.1.example.org", "robot.local"]
--- [True,True,True,False,False,False]
-isLoopback :: String -> Bool
-isLoopback name = map toLower name `elem` ["localhost", "::1", "[::1]"] || isFour (parts name)
- where
-  isFour these = take 1 these == ["127"] && length these == 4 && all isByte these
-  isByte digits = not (null digits) && length digits <= 3 && all isDigit digits && (read digits :: Int) < 256
-  parts text = case break (== '.') text of
-    (part, _ : others) -> part : parts others
-    (part, []) -> [part]
+import Behavior.Internal.Loopback (isLoopback)
 
 -- | Why a request with this header @Host@ is refused, if it is: under another name than one of this machine, a web
 -- page from elsewhere could read the answer (its author decides which address that name has). Any port is allowed:
@@ -69,7 +56,7 @@ refusedOrigin hasToken host origin = case origin of
 
 -- | Whether they are equal. How long that takes depends on the shown one's length alone.
 isToken :: Text -> Text -> Bool
-isToken token shown = Bytes.length right == Bytes.length given && differences == 0
+isToken token shown = differences == 0 && Bytes.length right == Bytes.length given
  where
   (right, given) = (encodeUtf8 token, encodeUtf8 shown)
   padded = Bytes.unpack right ++ repeat 0

@@ -78,15 +78,15 @@ noHistory = History Seq.empty 0 0 0 IntMap.empty Seq.empty Seq.empty 0
 add :: Limits -> [Event] -> History -> History
 add _ [] history = history
 add limits events history =
-  forgetting limits $ (foldl' (noting limits) history (zip events lines'))
+  forgetting limits $ (foldl' (noting limits) history (zip events each))
     { chunks = chunks history |> chunk
     , eventsKept = eventsKept history + length events
     , bytesKept = bytesKept history + size chunk
     , nextNumber = afterLast chunk
     }
  where
-  lines' = map (Bytes.init . toLazyByteString . encodeEvent) events
-  chunk = Chunk from (from + length events) $! compact (Bytes.intercalate (Bytes.singleton 44) lines')
+  each = map (Bytes.init . toLazyByteString . encodeEvent) events
+  chunk = Chunk from (from + length events) $! compact (Bytes.intercalate (Bytes.singleton 44) each)
   from = nextNumber history
   compact = Bytes.fromStrict . Bytes.toStrict
 
@@ -124,8 +124,8 @@ noting limits history (event, line) = case event of
 outside :: Int -> IntMap Span -> IntMap Span
 outside number later = IntMap.withoutKeys later inside
  where
-  inside = foldl' add' (IntSet.singleton number) (IntMap.elems later)
-  add' found s = case spanParent s of
+  inside = foldl' including (IntSet.singleton number) (IntMap.elems later)
+  including found s = case spanParent s of
     Inside p | p `IntSet.member` found -> IntSet.insert (spanNumber s) found
     _ -> found
 

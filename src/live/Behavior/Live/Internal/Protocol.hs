@@ -113,5 +113,5 @@ readAttach :: Bytes.ByteString -> Either String Attach
 readAttach bytes = eitherDecode bytes >>= parseEither attach
  where
   attach = withObject "attach" $ \o ->
-    Attach <$> o .: "version" <*> o .:? "token" <*> (liftA2' (,) <$> o .:? "run" <*> o .:? "next")
-  liftA2' f a b = f <$> a <*> b
+    Attach <$> o .: "version" <*> o .:? "token" <*> (both <$> o .:? "run" <*> o .:? "next")
+  both known n = (,) <$> known <*> n

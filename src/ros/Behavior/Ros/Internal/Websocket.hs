@@ -32,6 +32,7 @@ import Network.WebSockets.Stream (makeStream)
 import OpenSSL.Random (randBytes)
 import Text.Read (readMaybe)
 
+import Behavior.Internal.Loopback (isLoopback)
 import Behavior.Ros.Internal.Socket
 import Behavior.Ros.Internal.Tls
 import Behavior.Ros.Internal.Transport
@@ -58,7 +59,7 @@ import Behavior.STM (atomically)
 -- @since 0.1.0.0
 rosbridge :: String -> Transport
 rosbridge = toBridge Nothing $ \host ->
-  if host `elem` ["localhost", "::1"] || ("127." `isPrefixOf` host && all (`elem` "0123456789.") host)
+  if isLoopback host
     then Nothing
     else Just ("it is not on this machine; allowed: 127.0.0.1, ::1, localhost, wss, or rosbridgeAnywhere; not " ++ host)
 
