@@ -111,6 +111,11 @@ spec = guarded $ do
       ros <- withRos (fakeRos robot) pure
       end <- try (carrying ros "cup")
       either (\e -> e `shouldBe` LinkLost "the fake robot" "its withRos has ended") (const (expectationFailure "!")) end
+    it "that faults while it is closed says so to no one" . underSchedules 40 $ do
+      let asking = abandoning 1 (sleepForever `finally` throwFault)
+          throws = Transport "a name that no server knows" Nothing (pure "") (\_ _ _ -> asking)
+      inSeconds 0 (withRos throws (\_ -> sleep 0))
+      stopAfter 20 (withRos throws (const sleepForever)) >>= (`shouldBe` (Nothing :: Maybe ()))
     it "is a span in a trace, which says why it was lost" $ do
       run <- simulate . mission (const slowly) $ \robot ros -> do
         Signal.waitUntil (linkUp ros)

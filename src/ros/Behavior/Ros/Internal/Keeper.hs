@@ -10,7 +10,7 @@ module Behavior.Ros.Internal.Keeper
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (ErrorCall (..), Exception, finally, throwIO)
+import Control.Exception (ErrorCall (..), Exception, catch, finally, throwIO)
 import Control.Monad (forever, join, void, when)
 import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (for_, traverse_)
@@ -18,7 +18,7 @@ import qualified Data.Map.Strict as Map
 import qualified Data.Text as Text
 import Prelude hiding (take)
 
-import Behavior (Behavior, Seconds, sleep, tryAny, (?))
+import Behavior (Behavior, Seconds, StoppedWithFault (..), sleep, tryAny, (?))
 import Behavior.Internal.Core.Seconds (duration)
 import Behavior.Internal.Spans.Observer (noticed)
 import Behavior.Parallel (firstOf, fork, scoped)
@@ -120,8 +120,7 @@ keeping ros transport = go (firstPause options)
     -- (A bridge that closes each connection at once is not asked ever more often.)
     go (if lasted > longestPause options then firstPause options else min (longestPause options) (2 * pause))
 
--- | One connection, to its end: why it has ended. (Each branch gives its exception as a value. As a fault, one that
--- comes while the link is being closed would reach the behaviour's caller.)
+-- | One connection, to its end: why it has ended.
 connected :: Ros -> Transport -> Behavior String
 connected ros transport = do
   up <- newTVarIO False
@@ -139,7 +138,7 @@ connected ros transport = do
       tooLong = do
         timeout connectWithin (atomically (readTVar up >>= check)) ? throwIO (LinkEnds "it takes too long to connect")
         sleepForever
-  firstOf [either show id <$> tryAny oneConnection, whyItEnds tooLong]
+  firstOf [whyItEnds oneConnection, whyItEnds tooLong]
 
 -- | Why a link has ended.
 newtype LinkEnds = LinkEnds String
@@ -149,9 +148,10 @@ instance Show LinkEnds where
 
 instance Exception LinkEnds
 
--- | The exception that ends it.
-whyItEnds :: Behavior () -> Behavior String
-whyItEnds act = either show (\() -> "it was closed") <$> tryAny act
+-- | What it gives, or the exception that ends it. (One that comes while it is stopped says nothing of the behaviour
+-- for which there was a link; as a fault it would reach its caller.)
+whyItEnds :: Behavior String -> Behavior String
+whyItEnds act = (either show id <$> tryAny act) `catch` \(StoppedWithFault stop _) -> throwIO stop
 
 -- | How long it may take to connect.
 connectWithin :: Seconds

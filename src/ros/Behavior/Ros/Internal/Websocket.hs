@@ -20,7 +20,7 @@ import qualified Data.ByteString.Lazy as Bytes
 import Data.Char (isDigit)
 import Data.Foldable (traverse_)
 import Data.IORef
-import Data.List (isPrefixOf, stripPrefix)
+import Data.List (stripPrefix)
 import qualified Data.Text as Text
 import Data.Text.Encoding (decodeLatin1)
 import Network.Socket (Socket)
