@@ -166,7 +166,7 @@ explorations = do
           `shouldThrow` (== ErrorCall (name ++ ": a duration is zero or more seconds, not " ++ show t))
   it "fails, when its property catches that a run is not valid, or that it simulates twice" $ do
     let caught property simulating = property simulating `catchAny` \_ -> pure ()
-    tryExplore (randomly 2) (caught (\simulating -> void (simulating (threadDelay 700000))))
+    tryExplore (randomly 2) (caught (\simulating -> void (simulating (threadDelay 10000000))))
       `shouldFailWith` "threadDelay"
     tryExplore (randomly 2) (caught (\simulating -> simulating (pure ()) >> void (simulating (pure ()))))
       `shouldFailWith` "simulates only once"
