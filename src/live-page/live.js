@@ -6,6 +6,7 @@ const mostSpans = 20000; // that have ended
 const mostReactions = 2000;
 const mostRows = 300; // in a list
 const mostSeconds = 60; // of the timeline
+const mostSilence = 900; // milliseconds
 const $ = (id) => document.getElementById(id);
 
 // --- What is known ----------------------------------------------------------
@@ -19,7 +20,7 @@ let next = null; // the number of the event that comes next, when one is known
 let lost = 0; // by the robot
 let missed = 0; // events of which only the summary came
 let robotTime = 0; // of the last message that has one
-let heardAt = 0; // when any message came, by this page's clock
+let silence = null; // the timer of what comes when no message does
 let since = null; // when it was disconnected
 let isOver = false;
 let refusal = null;
@@ -90,7 +91,8 @@ function connect() {
     socket.send(JSON.stringify(attach));
   };
   socket.onmessage = ({ data }) => {
-    heardAt = performance.now();
+    clearTimeout(silence);
+    silence = setTimeout(isSilent, mostSilence);
     since = null;
     receive(JSON.parse(data));
     show();
@@ -143,17 +145,16 @@ function receive(message) {
 }
 
 // A robot that is stopped closes nothing: it only falls silent.
-setInterval(() => {
-  if (run && !since && !isOver && performance.now() - heardAt > 900) {
-    since = new Date(Date.now() - (performance.now() - heardAt));
-    show();
-  }
-}, 200);
+function isSilent() {
+  if (isOver || refusal) return;
+  since ??= new Date(Date.now() - mostSilence);
+  show();
+}
 
 // --- What is shown ----------------------------------------------------------
 
 let pausedAt = null; // the time that is shown; null: the present
-let selected = null; // the number of a span
+let selected = null; // the number of a span or of a reaction
 const inertly = /[\p{Cc}\p{Cf}\p{Cs}\p{Co}\p{Zl}\p{Zp}]/gu;
 
 // A text of the robot's, on one line and of bounded length; nothing in it can act.
@@ -165,11 +166,10 @@ function inert(text, most = 200) {
 const during = (time) => (time < 10 ? time.toFixed(1) : Math.round(time).toString()) + " s";
 const shownTime = () => pausedAt ?? robotTime;
 const runsAt = (span, time) => span.began <= time && (!span.end || span.ended > time);
-const wanted = (span) => {
-  const word = $("search").value.trim().toLowerCase();
-  const outcome = $("outcome").value;
-  return (!word || span.name.toLowerCase().includes(word)) && (!outcome || outcomeOf(span) === outcome);
-};
+let word = ""; // that is searched
+let outcome = ""; // that is shown; "": all
+const wanted = (span) =>
+  (!word || span.name.toLowerCase().includes(word)) && (!outcome || outcomeOf(span) === outcome);
 
 function pathOf(span) {
   const names = [];
@@ -207,9 +207,9 @@ function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-// Each row about a span has a button, which shows its details.
-function spanRow() {
-  const button = element("button", [], { type: "button", class: "span" });
+// Each row about a span or a reaction has a button, which shows its details.
+function detailedRow() {
+  const button = element("button", [], { type: "button" });
   const row = element("li", [button, element("span", [], { class: "age" })]);
   button.addEventListener("click", () => {
     selected = Number(row.dataset.number);
@@ -219,10 +219,10 @@ function spanRow() {
 }
 
 function writeSpan(row, span, more) {
-  const outcome = outcomeOf(span);
+  const how = outcomeOf(span);
   row.dataset.number = span.number;
-  row.firstChild.className = `span ${outcome}` + ($("search").value.trim() && wanted(span) ? " found" : "");
-  setText(row.firstChild, `${marks[outcome]} ${inert(span.name)}`);
+  row.firstChild.className = `span ${how}` + (word && wanted(span) ? " found" : "");
+  setText(row.firstChild, `${marks[how]} ${inert(span.name)}`);
   setText(row.lastChild, ` ${more}`);
 }
 
@@ -242,7 +242,7 @@ function showState(time) {
   const name = run ? inert(run.robot, 80) : "robot";
   setText($("robot"), name);
   if (document.title !== name) document.title = name;
-  document.body.classList.toggle("disconnected", Boolean(since || refusal || isOver));
+  document.body.classList.toggle("disconnected", Boolean(since || refusal));
   setText(
     $("state"),
     refusal ? `refused: ${inert(refusal)}`
@@ -283,7 +283,7 @@ function showTree(time) {
     }
   };
   walk(0, 0);
-  fill($("tree"), rows, spanRow, (row, { span, depth }) => {
+  fill($("tree"), rows, detailedRow, (row, { span, depth }) => {
     writeSpan(row, { ...span, end: undefined }, `for ${during(time - span.began)}`);
     row.style.paddingLeft = `${Math.min(depth, 12)}rem`;
   });
@@ -307,8 +307,10 @@ function sentence(reaction) {
 
 function showInterruptions(time) {
   const some = reactions.filter((r) => r.stopped && r.time <= time).slice(-20).reverse();
-  const make = () => element("li", [], { tabindex: "0" });
-  fill($("interruptions"), some.map((r) => [String(r.number), r]), make, (row, r) => setText(row, sentence(r)));
+  fill($("interruptions"), some.map((r) => [String(r.number), r]), detailedRow, (row, r) => {
+    row.dataset.number = r.number;
+    setText(row.firstChild, sentence(r));
+  });
 }
 
 function endText(end) {
@@ -329,7 +331,7 @@ function endText(end) {
 function showFailures(time) {
   const isFailure = (span) => span.end && span.ended <= time && ["failed", "faulted"].includes(span.end.how);
   const some = [...spans.values()].filter(isFailure).slice(-10).reverse();
-  fill($("failures"), some.map((s) => [String(s.number), s]), spanRow, (row, s) =>
+  fill($("failures"), some.map((s) => [String(s.number), s]), detailedRow, (row, s) =>
     writeSpan(row, s, `at ${s.ended.toFixed(1)} s ${endText(s.end)}`));
 }
 
@@ -350,6 +352,8 @@ function showSignals(time) {
 
 // --- The timeline -----------------------------------------------------------
 
+const laneHeight = 18;
+const mostLanes = 60;
 let seconds = 10; // that the timeline shows
 
 function barsAt(time) {
@@ -363,7 +367,7 @@ function barsAt(time) {
 function showBars(time) {
   if (!$("bars").parentElement.open) return;
   const some = barsAt(time).slice(-mostRows).reverse();
-  fill($("bars"), some.map((s) => [String(s.number), s]), spanRow, (row, s) =>
+  fill($("bars"), some.map((s) => [String(s.number), s]), detailedRow, (row, s) =>
     writeSpan(row, s, `${outcomeOf(s)}, ${s.began.toFixed(1)} s to ${s.end ? s.ended.toFixed(1) + " s" : "now"}`));
 }
 
@@ -380,50 +384,82 @@ function draw() {
   const canvas = $("timeline");
   const bars = barsAt(time);
   const lanes = new Map(); // by path
+  const lanesInside = new Map(); // by parent and name: there are fewer of these than of spans
   for (const span of bars) {
-    const path = pathOf(span).join(" / ");
-    if (!lanes.has(path)) lanes.set(path, []);
-    lanes.get(path).push(span);
+    const key = `${span.parent} ${span.name}`;
+    let lane = lanesInside.get(key);
+    if (!lane) {
+      const path = pathOf(span).join(" / ");
+      if (!lanes.has(path)) lanes.set(path, []);
+      lane = lanes.get(path);
+      lanesInside.set(key, lane);
+    }
+    lane.push(span);
   }
-  const rows = [...lanes].sort(([a], [b]) => (a < b ? -1 : a > b ? 1 : 0)).slice(0, 60);
-  const scale = window.devicePixelRatio || 1;
+  const rows = [...lanes].sort(([a], [b]) => (a < b ? -1 : a > b ? 1 : 0)).slice(0, mostLanes);
+  const g = canvas.getContext("2d");
+  const font = "12px system-ui, sans-serif";
+  g.font = font;
+  const labels = rows.map(([, some]) => inert(some[0].name, 40));
   const wide = canvas.clientWidth;
-  const high = Math.max(1, rows.length) * 18 + 4;
+  const left = Math.min(0.4 * wide, 12 + Math.max(0, ...labels.map((label) => g.measureText(label).width)));
+  const high = laneHeight * (rows.length + 1) + 4;
+  const scale = window.devicePixelRatio || 1;
   if (canvas.width !== Math.round(wide * scale) || canvas.height !== Math.round(high * scale)) {
     canvas.width = Math.round(wide * scale);
     canvas.height = Math.round(high * scale);
     canvas.style.height = `${high}px`;
   }
-  const g = canvas.getContext("2d");
   const style = getComputedStyle(document.documentElement);
-  const colour = (name) => style.getPropertyValue(`--${name}`);
+  const names = [...Object.keys(marks), "ground", "text", "line"];
+  const colours = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`)]));
+  const x = (t) => Math.max(left, wide - ((time - t) / seconds) * (wide - left));
   g.setTransform(scale, 0, 0, scale, 0, 0);
   g.clearRect(0, 0, wide, high);
-  g.font = "12px system-ui, sans-serif";
+  g.font = font;
+  drawAxis(g, x, time, wide, high, colours);
   drawn = [];
   rows.forEach(([, some], i) => {
-    const top = 2 + 18 * i;
+    const top = 2 + laneHeight * i;
+    g.fillStyle = colours.text;
+    g.fillText(labels[i], 2, top + 12, left - 6);
+    const painted = new Map(); // the outcome of what is narrower than a pixel, by its place
     for (const span of some) {
-      const from = Math.max(0, ((span.began - time) / seconds + 1) * wide);
-      const to = ((Math.min(span.ended ?? time, time) - time) / seconds + 1) * wide;
-      g.fillStyle = colour(span.end && span.ended <= time ? outcomeOf(span) : "running");
-      g.fillRect(from, top, Math.max(1, to - from), 15);
+      const [from, to] = [x(span.began), x(Math.min(span.ended ?? time, time))];
+      const how = span.end && span.ended <= time ? outcomeOf(span) : "running";
+      if (to - from < 1) {
+        if (painted.get(Math.floor(from)) === how) continue;
+        painted.set(Math.floor(from), how);
+      }
+      g.fillStyle = colours[how];
+      g.fillRect(from, top, Math.max(1, to - from), laneHeight - 3);
       if (to - from > 14) {
-        g.fillStyle = colour("ground");
-        g.fillText(marks[span.end && span.ended <= time ? outcomeOf(span) : "running"], from + 2, top + 12);
+        g.fillStyle = colours.ground;
+        g.fillText(marks[how], from + 2, top + 12);
       }
       drawn.push([from, top, to, span.number]);
     }
-    const last = some[some.length - 1];
-    g.fillStyle = colour("text");
-    g.fillText(inert(last.name, 40), 20, top + 12);
   });
+}
+
+// Lines at whole seconds, at most eight of them.
+function drawAxis(g, x, time, wide, high, colours) {
+  const step = [1, 2, 5, 10, 20].find((s) => seconds / s <= 8);
+  for (let t = step * Math.ceil((time - seconds) / step); t <= time; t += step) {
+    if (t < 0) continue;
+    g.fillStyle = colours.line;
+    g.fillRect(Math.round(x(t)), 0, 1, high);
+    g.fillStyle = colours.text;
+    const label = `${t} s`;
+    g.fillText(label, Math.min(x(t) + 3, wide - g.measureText(label).width), high - 5);
+  }
 }
 
 $("timeline").addEventListener("click", (event) => {
   const { left, top } = event.target.getBoundingClientRect();
   const [x, y] = [event.clientX - left, event.clientY - top];
-  const hit = drawn.filter(([from, t, to]) => x >= from - 2 && x <= to + 2 && y >= t && y < t + 18).pop();
+  const isHit = ([from, t, to]) => x >= from - 2 && x <= to + 2 && y >= t && y < t + laneHeight;
+  const hit = drawn.filter(isHit).pop();
   if (hit) {
     selected = hit[3];
     show();
@@ -432,20 +468,37 @@ $("timeline").addEventListener("click", (event) => {
 
 // --- Details, and what the reader asks for -----------------------------------
 
+function spanDetails(span) {
+  const rows = [
+    ["what", pathOf(span).join(" / ")],
+    ["from", `${span.began.toFixed(3)} s`],
+    ["to", span.end ? `${span.ended.toFixed(3)} s, after ${during(span.ended - span.began)}` : "it runs"],
+    ["how", `${marks[outcomeOf(span)]} ${endText(span.end)}`],
+  ];
+  const reaction = reactions.find((r) => r.number === span.reaction);
+  if (reaction) rows.push(["started by", sentence(reaction)]);
+  return rows;
+}
+
+function reactionDetails(reaction) {
+  const rows = [
+    ["what", sentence(reaction)],
+    ["where", [...pathOf(spans.get(reaction.parent)), inert(reaction.operator, 60)].join(" / ")],
+    ["changed", reaction.changes.map(changeText).join(" → ")],
+  ];
+  if (reaction.stopped) {
+    const { name, took, end } = reaction.stopped;
+    rows.push(["stopped", `${inert(name)}, which took ${(1000 * took).toFixed(1)} ms: ${endText(end)}`]);
+  }
+  return rows;
+}
+
 function showDetails() {
   const span = spans.get(selected);
-  const rows = span
-    ? [
-      ["what", pathOf(span).join(" / ")],
-      ["from", `${span.began.toFixed(3)} s`],
-      ["to", span.end ? `${span.ended.toFixed(3)} s, after ${during(span.ended - span.began)}` : "it runs"],
-      ["how", `${marks[outcomeOf(span)]} ${endText(span.end)}`],
-    ]
-    : [["", "none is chosen: choose what runs, or a bar"]];
-  if (span?.reaction !== undefined) {
-    const reaction = reactions.find((r) => r.number === span.reaction);
-    if (reaction) rows.push(["started by", sentence(reaction)]);
-  }
+  const reaction = span ? undefined : reactions.find((r) => r.number === selected);
+  const rows = span ? spanDetails(span)
+    : reaction ? reactionDetails(reaction)
+      : [["", "none is chosen: choose what runs, an interruption, or a bar"]];
   const details = $("details");
   while (details.children.length > 2 * rows.length) details.lastChild.remove();
   rows.forEach(([name, text], i) => {
@@ -467,8 +520,16 @@ $("time").addEventListener("input", () => {
   show();
 });
 
-$("search").addEventListener("input", show);
-$("outcome").addEventListener("change", show);
+$("search").addEventListener("input", (event) => {
+  word = event.target.value.trim().toLowerCase();
+  show();
+});
+
+$("outcome").addEventListener("change", (event) => {
+  outcome = event.target.value;
+  show();
+});
+
 $("bars").parentElement.addEventListener("toggle", show);
 $("controls").addEventListener("submit", (event) => event.preventDefault());
 window.addEventListener("resize", askForFrame);

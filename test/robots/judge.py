@@ -11,6 +11,8 @@ import os
 import statistics
 import sys
 
+from claims import all_of, at_most, claim, end, percentile
+
 FOLDER, ROWS = sys.argv[1], [int(row) for row in sys.argv[2:]]
 
 # What the servers have recorded of each goal, and each topic: (time, event), in the order of time.
@@ -33,22 +35,6 @@ if os.path.exists(FOLDER + "/lies"):
         lies_of[entry["mode"]].append(entry)
 
 ENDS = ("canceled", "succeeded", "aborted", "rejected")
-failed = 0
-
-
-def claim(row, what, figure, limit, holds):
-    global failed
-    failed += not holds
-    print(f"row {row}: {what}: {figure} ({limit}): {'ok' if holds else 'FAILED'}")
-
-
-def at_most(row, what, seconds, limit):
-    claim(row, what, f"{seconds * 1000:.1f} ms", f"at most {limit * 1000:.0f} ms", seconds <= limit)
-
-
-def all_of(row, what, good, every, least=1):
-    good, every = list(good), list(every)
-    claim(row, what, f"{len(good)} of {len(every)}", f"all, of {least} or more", len(good) == len(every) >= least)
 
 
 def none_of(row, what, bad):
@@ -69,11 +55,6 @@ def first(goal, *events):
 
 def has(goal, *events):
     return first(goal, *events) is not None
-
-
-def percentile(numbers, share):
-    numbers = sorted(numbers)
-    return numbers[min(len(numbers) - 1, int(share * len(numbers)))]
 
 
 def lies(goal):
@@ -475,4 +456,4 @@ def is_published(feedback, order):
 for row in ROWS:
     globals()[f"row_{row}"]()
     in_general(row)
-sys.exit(1 if failed else 0)
+end()

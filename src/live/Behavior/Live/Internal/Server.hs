@@ -52,8 +52,8 @@ data Shown = Shown
   , onlyHere :: Bool
   -- ^ Whether only this machine reaches it.
   , limits :: Limits
-  , pending :: TVar [Event]
-  -- ^ Those that are in no chunk yet, the newest first.
+  , pending :: TVar (Int, [Event])
+  -- ^ Those that are in no chunk yet, the newest first; and how many.
   , history :: TVar History
   , isOver :: TVar Bool
   -- ^ Whether no more events come.
@@ -66,20 +66,21 @@ data Shown = Shown
 newShown :: Limits -> Run -> Seconds -> Maybe Text -> Bool -> IO Shown
 newShown most this start secret here =
   Shown this start secret here most
-    <$> newTVarIO []
+    <$> newTVarIO (0, [])
     <*> newTVarIO noHistory
     <*> newTVarIO False
     <*> newTVarIO False
     <*> newTVarIO 0
 
--- | Takes the next events of the trace, when those before are in chunks (so what is too much is counted as lost by the
--- trace). Of each text a page needs no more than its first 1,000 characters.
+-- | Takes the next events of the trace; when too many of those before are in no chunk yet, it waits (so what is too
+-- much is counted as lost by the trace). Of each text a page needs no more than its first 1,000 characters.
 receive :: Shown -> [Event] -> IO ()
 receive shown events = do
   relative <- traverse (traverseTexts shortened . relativeTo (zero shown)) events
   atomically $ do
-    readTVar (pending shown) >>= check . null
-    writeTVar (pending shown) (reverse relative)
+    (count, before) <- readTVar (pending shown)
+    check (count < mostEvents (limits shown))
+    writeTVar (pending shown) (count + length relative, reverse relative ++ before)
 
 -- (Evaluated to its end, so that nothing longer is kept.)
 shortened :: String -> IO String
@@ -93,10 +94,10 @@ shortened text = short <$ evaluate (length short)
 publishing :: Shown -> IO ()
 publishing shown = do
   (events, ends) <- atomically $ do
-    events <- readTVar (pending shown)
+    (_, events) <- readTVar (pending shown)
     ends <- readTVar (isOver shown)
     check (ends || not (null events))
-    (events, ends) <$ writeTVar (pending shown) []
+    (events, ends) <$ writeTVar (pending shown) (0, [])
   before <- readTVarIO (history shown)
   after <- evaluate (add (limits shown) (reverse events) before)
   atomically (writeTVar (history shown) after)

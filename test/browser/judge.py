@@ -1,0 +1,399 @@
+"""Says how each row of the live page's table went, by what a browser shows, what a robot has recorded of itself, and
+what the system knows of connections.
+
+judge.py ROW...: BROWSER is the folder with the robot (test/Browser.hs). A line for each claim; the exit code is 1 if
+any has failed. No row waits for a time to pass: each waits for what it looks for, and gives up after a limit.
+"""
+
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import time
+import unicodedata
+
+from browser import Browser, delays
+from claims import all_of, at_most, claim, end, percentile
+from readers import Silent, ask, connections, tunnel, upgrade, reading
+from robot import FOLDER, Robot, running, until
+
+
+def row_1():
+    """Ten tabs, nine of them hidden."""
+    with Robot("work") as robot, Browser() as browser:
+        browser.open(robot)
+        for _ in range(9):
+            browser.tab()
+            browser.open(robot)
+        seen = []
+        for _ in range(20):
+            at = browser.js("notes.clock.length")
+            until(lambda: browser.js("notes.clock.length") > at, 5, "the clock")
+            seen += browser.other_tabs(9)
+        all_of(1, "hidden tabs that are live", [s for s in seen if s[:2] == ["hidden", "live"]], seen, 180)
+        claim(1, "the tab in front", browser.state(), "live", browser.state() == "live")
+        at_most(1, "the oldest text of a hidden tab", max(age for _, _, age in seen) / 1000, 0.5)
+
+
+def row_2():
+    """A reader that attaches late."""
+    with Robot("work") as robot, Browser() as browser:
+        robot.tell("tick 5")
+        robot.tell("order dock")
+        until(lambda: sum(e["event"] == "reacted" for e in robot.recorded()) > 300, 30, "300 reactions")
+        late, took, snapshots = [], [], []
+        for _ in range(20):
+            begun = time.monotonic()
+            with reading(robot.port) as messages:
+                for message in messages:
+                    if message["message"] == "snapshot":
+                        took.append(time.monotonic() - begun)
+                        snapshots.append(message)
+                        break
+        robot.tell("tick 0")
+        browser.driver.get(robot.address)
+        until(lambda: browser.js("notes.rows"), 5, "the tree")
+        in_page = browser.js("notes.rows") / 1000
+        tree, reacted = browser.tree(), browser.js("reactions.map((r) => r.number)")
+        robot.end()
+        events = robot.recorded()
+        for snapshot in snapshots:
+            before = events[:snapshot["next"]]
+            offset = {round(a["began"] - b["began"], 4) for a, b in zip(
+                snapshot["running"], sorted(running(before).values(), key=lambda e: e["number"]))}
+            same = (without_times(snapshot["running"])
+                    == without_times(sorted(running(before).values(), key=lambda e: e["number"]))
+                    and without_times(snapshot["reacted"])
+                    == without_times([e for e in before if e["event"] == "reacted"][-200:])
+                    and without_times(snapshot["ended"])
+                    == without_times([e for e in before if e["event"] == "ended"][-200:])
+                    and len(offset) == 1)
+            late.append(same)
+        all_of(2, "snapshots equal to the robot's own record", filter(None, late), late, 20)
+        at_most(2, "from the connection to the snapshot", max(took), 0.5)
+        at_most(2, "from the address to what runs, in a browser", in_page, 0.5)
+        last = [e["number"] for e in events if e["event"] == "reacted" and e["number"] <= reacted[-1]]
+        claim(2, "reactions in the page, equal to the robot's last ones", len(reacted), "200 or more",
+              len(reacted) >= 200 and reacted == last[-len(reacted):])
+        named = [e["name"] for e in sorted(running(events[:-6]).values(), key=lambda e: e["number"])
+                 if e["kind"] == "named"]
+        claim(2, "names that run, in the page", ", ".join(tree), "mission, dock, arm, wheels",
+              tree == ["mission", "dock", "arm", "wheels"] == named)
+
+
+def without_times(events):
+    """Texts of the events in which each time is left out. (The page and the file have different zeros.)"""
+    def cut(value):
+        if isinstance(value, dict):
+            return {k: cut(v) for k, v in value.items() if k not in ("time", "began", "ended", "took", "after")}
+        return [cut(v) for v in value] if isinstance(value, list) else value
+    return [json.dumps(cut(event), sort_keys=True) for event in events]
+
+
+def row_3():
+    """From the event to the page's text."""
+    with Robot("work") as robot, Browser() as browser:
+        browser.open(robot)
+        until(lambda: browser.js("notes.clock.length") > 220, 60, "220 values")
+        late = delays(browser.js("notes.clock")[20:])
+        print(f"row 3: {len(late)} values; the latest came after {max(late) * 1000:.0f} ms")
+        at_most(3, "median", statistics.median(late), 0.1)
+        at_most(3, "99th percentile", percentile(late, 0.99), 0.25)
+        claim(3, "errors in the console", browser.problems(), "none", not browser.problems())
+
+
+def row_4():
+    """The robot is stopped, killed, and started again."""
+    with Browser() as browser:
+        with Robot("work") as robot:
+            browser.open(robot)
+            for what, strike in (("stopped", signal.SIGSTOP), ("killed", signal.SIGKILL)):
+                begun = time.monotonic()
+                robot.process.send_signal(strike)
+                browser.comes("disconnected since", 5)
+                at_most(4, f"{what}: until the page says so", time.monotonic() - begun, 1)
+                shown = browser.js("getComputedStyle(document.querySelector('main')).filter")
+                claim(4, f"{what}: the values", shown, "grey", shown == "grayscale(1)")
+                if strike == signal.SIGSTOP:
+                    robot.process.send_signal(signal.SIGCONT)
+                    begun = time.monotonic()
+                    browser.comes("live", 5)
+                    at_most(4, "it goes on: until the page is live", time.monotonic() - begun, 3)
+            robot.process.wait()
+            held = browser.js("run.run")
+        with Robot("work", port=robot.port) as robot:
+            begun = time.monotonic()
+            browser.comes("live", 10)
+            at_most(4, "started again: until the page is live", time.monotonic() - begun, 3)
+            claim(4, "another run", browser.js("run.run"), f"not {held}", browser.js("run.run") != held)
+            robot.tell("tick 0")
+            robot.tell("order inspect")
+            until(lambda: "inspect" in browser.tree(), 5, "the new order")
+            own = [e["name"] for e in sorted(running(robot.recorded()).values(), key=lambda e: e["number"])
+                   if e["kind"] == "named"]
+            claim(4, "what runs, in the page", ", ".join(browser.tree()), ", ".join(own), browser.tree() == own)
+            own = [e["number"] for e in robot.recorded() if e["event"] == "reacted"]
+            until(lambda: browser.js("reactions.length") >= len(own), 5, "the last reaction")
+            held = browser.js("reactions.map((r) => r.number)")
+            claim(4, "reactions in the page, equal to the robot's", len(held), len(own), held[:len(own)] == own)
+
+
+def row_5():
+    """Twenty thousand events a second, for fifty seconds."""
+    with Robot("flood", 20000, recorded=False) as robot:
+        until(lambda: robot.cpu() > 2, 20, "two seconds of work")
+        alone = robot.memory()
+        robot.end()
+    with Robot("flood", 20000, recorded=False) as robot, Browser() as browser:
+        browser.open(robot)
+        begun, heaps, told = time.monotonic(), [], set()
+        while time.monotonic() - begun < 50:
+            heaps.append((time.monotonic() - begun, browser.heap()))
+            told.add(browser.text("#told"))
+            until(lambda: time.monotonic() - begun > heaps[-1][0] + 1, 2)
+        frames = browser.js("notes.frames.slice(1).map((t, i) => t - notes.frames[i])")
+        lost, missed = browser.js("[lost, missed]")
+        print(f"row 5: {len(frames)} frames: the longest took {max(frames):.0f} ms, "
+              f"the median {statistics.median(frames):.0f} ms; the page has held {browser.js('spans.size')} spans")
+        with_page = robot.memory()
+        made = int(robot.end())
+        claim(5, "events a second", round(made / 50), "20,000 or more", made >= 20000 * 50)
+        claim(5, "events that the robot has discarded", lost, "0", lost == 0)
+        print(f"row 5: events of which only a summary came: {missed}")
+        # (What is garbage is taken out; messages that are being read are in it.)
+        plateau = max(heap for when, heap in heaps if when < 20)
+        most = max(heap for _, heap in heaps)
+        print("row 5: the page's heap, in MiB:", *(f"{heap / 2**20:.1f}" for _, heap in heaps))
+        claim(5, "the page's heap: most, by the most of the first 20 s", f"{most / plateau:.2f}", "at most 1.2",
+              most <= 1.2 * plateau)
+        claim(5, "the page's heap", f"{most / 2**20:.1f} MiB", "at most 64 MiB", most <= 64 * 2**20)
+        more = (with_page - alone) / 2**20
+        claim(5, "the robot's memory, more than without a reader", f"{more:.1f} MiB", "at most 64 MiB", more <= 64)
+
+
+def watched(silent, known):
+    return all([s.watched(known) for s in silent])
+
+
+def row_6():
+    """Twenty readers that never read."""
+    with Robot("flood", 20000, recorded=False) as robot, Browser() as browser:
+        browser.open(robot)
+        silent = [Silent(robot.port) for _ in range(20)]
+        until(lambda: watched(silent, connections(robot.port)), 60, "the end of all twenty")
+        stuck = [s.ended - s.stalled for s in silent]
+        claim(6, "readers that were cut", len(stuck), "20", len(stuck) == 20)
+        at_most(6, "from the first byte that was not taken until it was cut", max(stuck), 6)
+        late = delays(browser.js("notes.clock")[5:])
+        print(f"row 6: {len(late)} values; the median came after {statistics.median(late) * 1000:.0f} ms")
+        at_most(6, "the others' delay, at most", max(late), 0.25)
+        claim(6, "the other reader", browser.state(), "live", browser.state() == "live")
+
+
+def row_12():
+    """A page that is overtaken says how much it has missed. (The broken variants are in test/mutants/Live.txt.)"""
+    with Robot("flood", 40000, recorded=False) as robot, Browser() as browser:
+        browser.open(robot)
+        browser.driver.execute_script("""
+          window.came = next;
+          const learned = receive;
+          receive = (message) => { if (message.message === "events") came += message.events.length; learned(message); };
+          const begun = performance.now();
+          while (performance.now() - begun < 4500);""")
+        until(lambda: browser.js("missed"), 30, "a gap")
+        came, missed, after = browser.js("[came, missed, next]")
+        claim(12, "events that came, and those that the page says it has missed", f"{came} and {missed}",
+              f"{after} in all", came + missed == after)
+        told = browser.text("#told")
+        claim(12, "the page says", told, f"gap: of {missed} events", told.startswith(f"gap: of {missed} events"))
+
+
+def row_8():
+    """Who may read it."""
+    with Robot("work") as robot:
+        own = f"127.0.0.1:{robot.port}"
+        refusals = {
+            "a foreign Host": ask(robot.port, [("Host", "robot.example:8420")]),
+            "a foreign Origin": ask(robot.port, upgrade(own, "http://evil.example"), "/live"),
+            "the Origin null": ask(robot.port, upgrade(own, "null"), "/live"),
+            "no Origin": ask(robot.port, upgrade(own), "/live"),
+        }
+        for what, (status, text) in refusals.items():
+            claim(8, what, f"{status} {text.splitlines()[-1][:60]}", "403", status == 403)
+        status, _ = ask(robot.port, upgrade(own, "http://" + own), "/live")
+        claim(8, "its own Origin", status, "101", status == 101)
+        with tunnel(robot.port) as port, Browser() as browser:
+            browser.driver.get(f"http://127.0.0.1:{port}/")
+            browser.comes("live", 5)
+            claim(8, "another port, by a tunnel", browser.state(), "live", browser.state() == "live")
+    with Robot("secret", recorded=False) as robot, Browser() as browser:
+        for token, wanted in (("another", "refused"), ("", "refused"), ("a%20secret", "live")):
+            browser.driver.get("about:blank")
+            browser.driver.get(robot.address + ("#" + token if token else ""))
+            browser.comes(wanted, 5)
+            claim(8, f"the token {token or '(none)'}", browser.state(), wanted, browser.state().startswith(wanted))
+    with Robot("open", recorded=False) as robot:
+        refused = False
+        try:
+            ask(robot.port, [("Host", "127.0.0.1")])
+        except ConnectionRefusedError:
+            refused = True
+        claim(8, "beyond loopback without a token", robot.says.strip(), "no page", refused and "no page" in robot.says)
+
+
+HOSTILE = [
+    "<img src=x onerror=window.hit=1>",
+    "</script><script>window.hit=1</script>",
+    "<svg onload=window.hit=1>",
+    "\"><iframe src=javascript:window.hit=1>",
+    "javascript:window.hit=1",
+    "\x00\x07\x1b[31mred\x1b[0m\x08\x7f\x9b",
+    "\u202egnp.exe\u2066\u2069\u200f",
+    "one\ntwo\r\u2028three\u2029\u200b",
+    "&lt;b&gt;&#60;i&#62;",
+    "${window.hit=1}{{constructor.constructor('window.hit=1')()}}",
+    "<link rel=stylesheet href=http://evil.example/x.css><img src=http://evil.example/x.png>",
+    "a megabyte" * 100_000,
+]
+
+
+def as_text(name):
+    """How the page shows it: two hundred characters, and what acts by its number."""
+    short = name[:200] + ("…" if len(name) > 200 else "")
+    return "".join(f"\\u{{{ord(c):x}}}" if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Co", "Zl", "Zp") else c
+                   for c in short)
+
+
+def row_9():
+    """Names that would act, if they were taken for more than texts."""
+    saved = FOLDER + "/saved/run.jsonl"
+    if os.path.exists(saved):
+        os.remove(saved)
+    with Robot("hostile", first=json.dumps(HOSTILE)) as robot, Browser() as browser:
+        browser.open(robot)
+        until(lambda: browser.js("[...spans.values()].filter((s) => s.end?.how === 'failed').length") >= len(HOSTILE),
+              30, "all failures")
+        browser.find("#timeline").click()
+        browser.js("document.querySelector('details').open = true")
+        for selector in ("#tree .span", "#interruptions button", "#failures .span"):
+            for element in browser.driver.find_elements("css selector", selector)[:15]:
+                browser.driver.execute_script("arguments[0].click()", element)
+        elements = browser.js("[...document.body.querySelectorAll('*')].map((e) => e.localName)")
+        allowed = set("a button canvas dd details dl dt form h1 h2 header input label li main ol option output p section "
+                      "select span summary table tbody td th thead tr ul".split())
+        claim(9, "elements that no name may make", sorted(set(elements) - allowed), "none", set(elements) <= allowed)
+        claim(9, "what acted", browser.js("window.hit ?? null"), "None", browser.js("window.hit ?? null") is None)
+        texts = browser.js("[document.title, document.body.innerText, ...[...document.querySelectorAll('input,"
+                           "[aria-label],[title]')].map((e) => e.value + e.ariaLabel + e.title)].join('')")
+        bad = {c for c in texts if c != "\n" and c != "\t" and not c.isprintable()}
+        claim(9, "characters that act, in the page and its title", sorted(map(ascii, bad)), "none", not bad)
+        shown = [text[2:] for text in browser.texts("#tree .span")]
+        all_of(9, "names that are shown, as texts", [name for name in HOSTILE if as_text(name) in shown], HOSTILE, 12)
+        longest = max(map(len, browser.texts("#tree li")))
+        claim(9, "characters of the longest row", longest, "at most 300", longest <= 300)
+        browser.find("#save").click()
+        until(lambda: os.path.exists(saved), 10, "the saved file")
+        with open(saved, newline="") as file:
+            content = file.read()
+        bad = {c for c in content if c != "\n" and not c.isprintable()} | {c for c in "<>&" if c in content}
+        claim(9, "characters that act, in the saved file", sorted(map(ascii, bad)), "none", not bad)
+        events = [json.loads(line) for line in content.splitlines()]
+        claim(9, "names in the saved file, of which the first thousand characters are equal",
+              len({e["name"][:1000] for e in events if "name" in e} & {name[:1000] for name in HOSTILE}), "12",
+              {name[:1000] for name in HOSTILE} <= {e["name"][:1000] for e in events if "name" in e})
+        said = subprocess.run([FOLDER + "/behavior-trace", saved, "--tree"], capture_output=True, text=True)
+        claim(9, "behavior-trace reads the saved file", f"exit code {said.returncode}", "0", said.returncode == 0)
+        foreign = [url for url in browser.requests() if not url.startswith((
+            robot.address, robot.address.replace("http", "ws"), "data:", "blob:" + robot.address))]
+        claim(9, "requests to anything else", foreign, "none", not foreign)
+        claim(9, "errors in the console", browser.problems(), "none", not browser.problems())
+
+
+def row_10():
+    """For all: what axe-core finds, and a keyboard alone."""
+    with open(FOLDER + "/node_modules/axe-core/axe.min.js") as file:
+        axe = file.read()
+    with Robot("work") as robot:
+        robot.tell("tick 0")
+        for order in ("survey", "dock", "inspect"):
+            robot.tell("order " + order)
+            until(lambda: any(e.get("name") == order for e in robot.recorded()), 5, order)
+        for dark in (False, True):
+            for width in (1280, 360):
+                with Browser(width=width, dark=dark) as browser:
+                    browser.open(robot)
+                    until(lambda: "inspect" in browser.tree(), 5, "the order")
+                    browser.js("document.querySelector('details').open = true")
+                    browser.find("#tree button").click()
+                    browser.driver.execute_script(axe)
+                    found = browser.driver.execute_async_script("axe.run().then(arguments[0])")
+                    faults = [f"{v['id']} ({len(v['nodes'])}): {v['nodes'][0]['html'][:100]}"
+                              for v in found["violations"]]
+                    claim(10, f"axe-core, {'dark' if dark else 'light'}, {width} px: violations", faults, "none",
+                          not faults and len(found["passes"]) > 20)
+                    wide = browser.js("[document.documentElement.scrollWidth, innerWidth]")
+                    claim(10, f"{width} px: the page's width", wide[0], f"at most {wide[1]}", wide[0] <= wide[1])
+        with Browser() as browser:
+            browser.open(robot)
+            until(lambda: "inspect" in browser.tree(), 5, "the order")
+            by_keyboard(browser, robot)
+
+
+def by_keyboard(browser, robot):
+    focused = lambda: browser.driver.switch_to.active_element
+
+    def tab_to(wanted):
+        """Presses Tab until what has the focus has that in its accessible name."""
+        names = []
+        while len(names) < 40:
+            press(browser, "\ue004")
+            names.append(focused().accessible_name)
+            if wanted in names[-1]:
+                return names[-1]
+        raise TimeoutError(f"no Tab leads to {wanted}, but to {names}")
+
+    name = tab_to("stopped dock")
+    claim(10, "by keyboard: the last interruption", name, "order inspect (was dock), stopped dock",
+          all(part in name for part in ("order inspect (was dock)", "stopped dock", "starts inspect")))
+    press(browser, "\ue007")
+    claim(10, "by keyboard: its details", browser.text("#details")[:80], "dock", "dock" in browser.text("#details"))
+    browser.driver.refresh()
+    browser.comes("live", 5)
+    name = tab_to("Pause")
+    press(browser, " ")
+    browser.comes("paused", 5)
+    claim(10, "by keyboard: pause", f"{name}: {browser.state()}", "paused", browser.state() == "paused")
+    before = browser.js("reactions.length")
+    robot.tell("order dock")
+    until(lambda: browser.js("reactions.length") > before, 5, "the next reaction")
+    claim(10, "what runs, while it is paused", browser.tree()[1], "inspect", browser.tree()[1] == "inspect")
+    press(browser, " ")
+    browser.comes("live", 5)
+    name = tab_to("Search")
+    press(browser, "wheels")
+    found = browser.texts("#tree .found")
+    claim(10, "by keyboard: search", f"{name}: {found}", "wheels", len(found) == 1 and "wheels" in found[0])
+    # (The list of bars is open by the keyboard, too.)
+    tab_to("The bars as a list")
+    press(browser, "\ue007")
+    until(lambda: browser.texts("#bars li"), 5, "the bars")
+    bars = browser.texts("#bars li")
+    claim(10, "by keyboard: the bars that are found, as a list", len(bars), "4, each of wheels",
+          len(bars) == 4 and all("wheels" in bar for bar in bars))
+
+
+def press(browser, keys):
+    from selenium.webdriver.common.action_chains import ActionChains
+    ActionChains(browser.driver).send_keys(keys).perform()
+
+
+for row in map(int, sys.argv[1:]):
+    begun = time.monotonic()
+    try:
+        globals()[f"row_{row}"]()
+    except Exception as problem:
+        claim(row, "the row ended", f"{type(problem).__name__}: {problem}".splitlines()[0], "well", False)
+    print(f"row {row}: it took {time.monotonic() - begun:.0f} s", flush=True)
+end()

@@ -1,0 +1,103 @@
+"""Readers of a robot's page that are no browser, and what the system knows of their connections."""
+
+import base64
+import contextlib
+import json
+import os
+import socket
+import struct
+import threading
+import time
+
+import websockets.sync.client
+
+
+def ask(port, headers, path="/"):
+    """The status and the text of the answer to a request with these headers only."""
+    lines = [f"GET {path} HTTP/1.1", *(f"{name}: {value}" for name, value in headers),
+             "Connection: " + ("Upgrade" if path == "/live" else "close"), "", ""]
+    with socket.create_connection(("127.0.0.1", port), 5) as connection:
+        connection.settimeout(5)
+        connection.sendall("\r\n".join(lines).encode())
+        answer = connection.recv(65536)
+    return int(answer.split()[1]), answer.decode("utf-8", "replace")
+
+
+def upgrade(host, origin=None):
+    """The headers of a request for the websocket."""
+    key = base64.b64encode(os.urandom(16)).decode()
+    headers = [("Host", host), ("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13"), ("Sec-WebSocket-Key", key)]
+    return headers + ([("Origin", origin)] if origin is not None else [])
+
+
+@contextlib.contextmanager
+def reading(port, **attach):
+    """The messages that a reader receives."""
+    place = f"127.0.0.1:{port}"
+    with websockets.sync.client.connect(f"ws://{place}/live", origin=f"http://{place}", max_size=None) as connection:
+        connection.send(json.dumps({"version": 1, **attach}))
+        yield map(json.loads, connection)
+
+
+@contextlib.contextmanager
+def tunnel(port):
+    """Another port, at which everything is passed on to that one: as ssh -L does."""
+    listening = socket.create_server(("127.0.0.1", 0))
+
+    def passing(one, other):
+        with contextlib.suppress(OSError):
+            while part := one.recv(65536):
+                other.sendall(part)
+        for end in (one, other):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+    def accepting():
+        with contextlib.suppress(OSError):
+            while True:
+                here, _ = listening.accept()
+                there = socket.create_connection(("127.0.0.1", port))
+                for ends in ((here, there), (there, here)):
+                    threading.Thread(target=passing, args=ends, daemon=True).start()
+
+    threading.Thread(target=accepting, daemon=True).start()
+    try:
+        yield listening.getsockname()[1]
+    finally:
+        listening.close()
+
+
+def connections(port):
+    """The robot's ends of connections, by the port of the other end: whether each is established, and how many bytes
+    wait to be taken by the other end. (What the kernel says.)"""
+    with open("/proc/net/tcp") as file:
+        rows = [line.split() for line in file][1:]
+    return {int(row[2].split(":")[1], 16): (row[3] == "01", int(row[4].split(":")[0], 16))
+            for row in rows if int(row[1].split(":")[1], 16) == port}
+
+
+class Silent:
+    """A reader that attaches, and never reads."""
+
+    def __init__(self, port):
+        self.port, self.waiting, self.stalled, self.ended = port, 0, None, None
+        self.socket = socket.socket()
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        self.socket.connect(("127.0.0.1", port))
+        place = f"127.0.0.1:{port}"
+        lines = ["GET /live HTTP/1.1", *(f"{n}: {v}" for n, v in upgrade(place, f"http://{place}")),
+                 "Connection: Upgrade", "", ""]
+        self.socket.sendall("\r\n".join(lines).encode())
+        attach = b'{"version":1}'
+        mask = os.urandom(4)
+        self.socket.sendall(struct.pack("BB", 0x81, 0x80 | len(attach)) + mask
+                            + bytes(b ^ mask[i % 4] for i, b in enumerate(attach)))
+
+    def watched(self, known):
+        """Looks at its connection: whether it has ended. (Stalled: the robot's bytes are taken no more.)"""
+        is_there, waiting = known.get(self.socket.getsockname()[1], (False, 0))
+        if self.ended is None and not is_there:
+            self.ended = time.monotonic()
+        elif is_there and waiting != self.waiting:
+            self.waiting, self.stalled = waiting, time.monotonic()
+        return self.ended is not None
