@@ -11,7 +11,7 @@ import Row
 promises :: [Group]
 promises =
   [trying, together, reacting, manyBranches, rules, unchangedRules, longPrograms, traces]
-    ++ [reactions, coldReactions, besideComputation, plainReactions, idleFleet, fleetBytes, fleetTime]
+    ++ [reactions, coldReactions, besideComputation, livePage, plainReactions, idleFleet, fleetBytes, fleetTime]
     ++ [seamTime, seamBytes, simulator, simulatedDay, explorations]
 
 -- What the operators cost, compared with the same by hand or in a behaviour tree.
@@ -98,6 +98,13 @@ traces =
 
 operators :: String -> [Row] -> Group
 operators title = Group title "-N1 -A4m"
+
+livePage :: Group
+livePage =
+  Group "A reaction in a trace, with a live page: microseconds" "-I0 -A16m -qm -N1" $
+    [ "live reaction, 10 readers" `within` 1.25 `times` "live reaction, no reader"
+    , "live reaction, no reader" `beside` "live reaction, no page"
+    ]
 
 -- From the change of a condition to the start of the recovery, compared with a bare thread.
 
