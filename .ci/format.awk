@@ -40,7 +40,7 @@ characters($0) > 120 && (page ? example : !printed || example) && text !~ /^\|.*
   wrong("at most 120 characters, but in a table, in what an example prints, and with a link; here: " characters($0))
 }
 
-/\t/ && FILENAME !~ /(Makefile|\.tsv)$/ { wrong("no tab, but in a Makefile and in .tsv") }
+/\t/ && FILENAME !~ /(Makefile|\.tsv|\.go|go\.mod)$/ { wrong("no tab, but in a Makefile, in .tsv and in Go") }
 
 /[ \t]$/ { wrong("no blank at the end of a line") }
 

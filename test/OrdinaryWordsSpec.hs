@@ -50,6 +50,7 @@ import Behavior.Trace.Describe
 import Behavior.Trace.Diff
 import Behavior.Trace.File
 import Behavior.Trace.Format
+import Behavior.Trace.Otlp
 import Behavior.Trace.Path
 import Behavior.Trace.Recording
 import Behavior.Trace.Summary

@@ -6,6 +6,7 @@ import qualified Viewer.DiffSpec
 import qualified Viewer.FileSpec
 import qualified Viewer.FormatSpec
 import qualified Viewer.InterruptionSpec
+import qualified Viewer.OtlpSpec
 import qualified Viewer.OutputSpec
 import qualified Viewer.PictureSpec
 import qualified Viewer.PlainLinesSpec
@@ -38,6 +39,7 @@ main = hspec $ do
   describe "The summary" Viewer.SummarySpec.spec
   describe "The differences" Viewer.DiffSpec.spec
   describe "The trace-event format" Viewer.TraceEventsSpec.spec
+  describe "OTLP" Viewer.OtlpSpec.spec
   describe "A simulated run" Viewer.SimulatedSpec.spec
   describe "Texts of others" Viewer.TextSpec.spec
   describe "Viewing" Viewer.ViewingSpec.spec

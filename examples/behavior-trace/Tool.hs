@@ -15,11 +15,13 @@ import Data.Text.Lazy.Encoding (encodeUtf8)
 import Options.Applicative
 import System.Directory (canonicalizePath)
 import System.Exit (ExitCode (..))
+import System.FilePath (takeBaseName)
 
 import Behavior.Trace (Event)
 import Behavior.Trace.Describe (inert)
 import Behavior.Trace.Diff
 import Behavior.Trace.File
+import Behavior.Trace.Otlp
 import Behavior.Trace.Recording
 import Behavior.Trace.Summary
 import Behavior.Trace.Svg
@@ -31,8 +33,8 @@ data Options = Options FilePath Mode
 data Mode
   = -- | Prints a text.
     Print (Recording -> String)
-  | -- | Writes a file.
-    Write (Recording -> Lazy.ByteString) FilePath
+  | -- | Writes a file, given the robot's name too, and the header.
+    Write (String -> Header -> Recording -> Lazy.ByteString) FilePath
   | -- | Compares with another file.
     Compare FilePath
 
@@ -41,7 +43,7 @@ data Mode
 run :: [String] -> IO (ExitCode, String, String)
 run arguments = case execParserPure defaultPrefs commandLine arguments of
   Success (Options file mode) -> do
-    result <- runExceptT (load file >>= uncurry (perform file mode))
+    result <- runExceptT (load file >>= perform file mode)
     pure $ case result of
       Left problem -> (ExitFailure 2, "", problem ++ "\n")
       Right (printed, remarks) -> (ExitSuccess, printed, unlines remarks)
@@ -68,32 +70,37 @@ modes =
     <|> flag'
       (Print (renderSummary . summary))
       (long "summary" <> help "print where the time went, what interrupted, and what failed")
-    <|> writing "svg" (encodeUtf8 . timeline) "draw the timeline: one SVG file, which a browser shows"
-    <|> writing "trace-events" renderTraceEvents "write the trace-event format, for Perfetto, Chrome and speedscope"
+    <|> writing "svg" (ofRecording (encodeUtf8 . timeline)) "draw the timeline: one SVG file, which a browser shows"
+    <|> writing
+      "trace-events"
+      (ofRecording renderTraceEvents)
+      "write the trace-event format, for Perfetto, Chrome and speedscope"
+    <|> writing "otlp" renderOtlp "write a trace of OpenTelemetry (OTLP in JSON), for its collector, Jaeger and Tempo"
     <|> Compare <$> strOption (long "diff" <> metavar "OTHER" <> help "print what another trace has differently")
  where
+  ofRecording render _ _ = render
   writing name render what = Write render <$> strOption (long name <> metavar "OUT" <> help what)
 
-perform :: FilePath -> Mode -> [Event] -> [String] -> ExceptT String IO (String, [String])
-perform file mode events remarks = case mode of
+perform :: FilePath -> Mode -> (Header, [Event], [String]) -> ExceptT String IO (String, [String])
+perform file mode (header, events, remarks) = case mode of
   Print render -> pure (render (recording events), remarks)
   Write render out -> do
     same <- attempt ((==) <$> canonicalizePath file <*> canonicalizePath out)
     when same (throwE (inert out ++ ": this is the file of the trace; allowed: another file"))
-    attempt (Lazy.writeFile out (render (recording events)))
+    attempt (Lazy.writeFile out (render (takeBaseName file) header (recording events)))
     pure ("", remarks)
   Compare other -> do
-    (otherEvents, otherRemarks) <- load other
+    (_, otherEvents, otherRemarks) <- load other
     pure (renderDifference (difference (recording events) (recording otherEvents)), remarks ++ otherRemarks)
 
--- The events of a file, and a remark if its last line is incomplete.
-load :: FilePath -> ExceptT String IO ([Event], [String])
+-- The header and the events of a file, and a remark if its last line is incomplete.
+load :: FilePath -> ExceptT String IO (Header, [Event], [String])
 load file = do
   -- It is read while it is parsed, so that it is never in memory as a whole.
   parsed <- attempt (Lazy.readFile file >>= evaluate . parseTrace)
   case parsed of
     Left problem -> throwE (inert file ++ ": " ++ explainTraceError problem)
-    Right (_, events, torn) -> pure (events, maybe [] (pure . remark) torn)
+    Right (header, events, torn) -> pure (header, events, maybe [] (pure . remark) torn)
  where
   remark (TornLine n bytes) =
     inert file ++ ": line " ++ show n ++ ": incomplete (" ++ show bytes

@@ -23,6 +23,7 @@ import Behavior.Trace
 import Behavior.Trace.Diff (difference, renderDifference)
 import Behavior.Trace.File
 import Behavior.Trace.Format (decodeEvent)
+import Behavior.Trace.Otlp (renderOtlp)
 import Behavior.Trace.Recording (recording, withoutOperators)
 import Behavior.Trace.Summary (renderSummary, summary)
 import Behavior.Trace.Svg (timeline)
@@ -219,6 +220,7 @@ spec = do
                 , renderDifference (difference r r)
                 , Text.unpack (timeline r)
                 , Text.unpack (Text.decodeUtf8 (renderTraceEvents r))
+                , Text.unpack (Text.decodeUtf8 (renderOtlp "Ann" header r))
                 , concatMap plainLine events
                 ]
              where

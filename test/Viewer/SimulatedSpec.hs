@@ -15,6 +15,7 @@ import Behavior.Time
 import Behavior.Trace
 import Behavior.Trace.Diff
 import Behavior.Trace.File
+import Behavior.Trace.Otlp
 import Behavior.Trace.Recording
 import Behavior.Trace.Summary
 import Behavior.Trace.Svg
@@ -39,6 +40,7 @@ spec = do
   goldenText "simulated-summary.txt" (renderSummary (summary shown))
   goldenText "simulated-diff.txt" (renderDifference (difference shown (recording (withoutOperators full))))
   golden "simulated-trace-events.json" (renderTraceEvents shown)
+  golden "simulated-otlp.json" (renderOtlp "greenhouse" header (recording low))
   goldenSvg "simulated-timeline.svg" (timeline shown)
  where
   hasEnded name event = case event of

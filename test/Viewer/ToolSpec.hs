@@ -12,6 +12,7 @@ import Test.Hspec
 
 import Behavior.Trace.Diff
 import Behavior.Trace.File
+import Behavior.Trace.Otlp
 import Behavior.Trace.Recording
 import Behavior.Trace.Summary
 import Behavior.Trace.Svg
@@ -35,12 +36,17 @@ spec = around withMissions $ do
     run [folder </> "mission", "--trace-events", folder </> "out"] `shouldReturn` (ExitSuccess, "", "")
     made <- Bytes.readFile (folder </> "out")
     made `shouldBe` renderTraceEvents (recording mission)
+  it "writes OTLP, with the name of the file as that of the service" $ \folder -> do
+    Bytes.writeFile (folder </> "Ann.jsonl") (renderTrace header mission)
+    run [folder </> "Ann.jsonl", "--otlp", folder </> "out"] `shouldReturn` (ExitSuccess, "", "")
+    made <- Bytes.readFile (folder </> "out")
+    made `shouldBe` renderOtlp "Ann" header (recording mission)
   it "draws the timeline" $ \folder -> do
     run [folder </> "mission", "--svg", folder </> "out.svg"] `shouldReturn` (ExitSuccess, "", "")
     made <- Bytes.readFile (folder </> "out.svg")
     made `shouldBe` Text.encodeUtf8 (timeline (recording mission))
   it "does not replace the trace by what it makes of it" $ \folder -> do
-    forM_ ["--trace-events", "--svg"] $ \option ->
+    forM_ ["--trace-events", "--otlp", "--svg"] $ \option ->
       run [folder </> "mission", option, folder </> "." </> "mission"] >>= failsWith "this is the file of the trace"
     content <- Bytes.readFile (folder </> "mission")
     content `shouldBe` renderTrace header mission
@@ -67,7 +73,7 @@ spec = around withMissions $ do
   it "reports a file that cannot be read or written, with status 2" $ \folder -> do
     run [folder </> "none", "--tree"] >>= failsWith "none"
     run [folder, "--tree"] >>= failsWith folder
-    forM_ ["--trace-events", "--svg"] $ \option ->
+    forM_ ["--trace-events", "--otlp", "--svg"] $ \option ->
       run [folder </> "mission", option, folder </> "none" </> "out"] >>= failsWith "out"
   it "refuses other options, with status 2" $ \folder ->
     forM_
@@ -81,7 +87,7 @@ spec = around withMissions $ do
   it "explains its options" $ \_ -> do
     (status, printed, _) <- run ["--help"]
     status `shouldBe` ExitSuccess
-    forM_ ["--tree", "--summary", "--svg OUT", "--trace-events OUT", "--diff OTHER"] $ \option ->
+    forM_ ["--tree", "--summary", "--svg OUT", "--trace-events OUT", "--otlp OUT", "--diff OTHER"] $ \option ->
       printed `shouldSatisfy` isInfixOf option
  where
   failsWith why (status, printed, remarks) = do

@@ -16,6 +16,7 @@ import Behavior.Time (Seconds)
 import Behavior.Trace
 import Behavior.Trace.Diff
 import Behavior.Trace.File
+import Behavior.Trace.Otlp
 import Behavior.Trace.Recording
 import Behavior.Trace.Summary (renderSummary, summary)
 import Behavior.Trace.Svg
@@ -96,6 +97,7 @@ views =
   , ("the differences", \events -> let r = recording events in size (renderDifference (difference r r)))
   , ("the differences from nothing", size . renderDifference . difference (recording []) . recording)
   , ("the trace-event format", Bytes.length . renderTraceEvents . recording)
+  , ("OTLP", Bytes.length . renderOtlp "Ann" header . recording)
   , ("the timeline", Text.length . timeline . recording)
   , ("the lines", size . concatMap plainLine)
   , ("the tree in the terminal", size . concatMap plain . treeLines 50 100 0 . foldl' watch nothingYet)

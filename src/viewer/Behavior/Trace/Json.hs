@@ -10,6 +10,7 @@ module Behavior.Trace.Json
   , writtenExcept
   , text
   , number
+  , nanoseconds
   ) where
 
 import Data.Aeson.Encoding (Encoding, encodingToLazyByteString, unsafeToEncoding)
@@ -21,6 +22,8 @@ import qualified Data.Text as Text
 import qualified Data.Text.Lazy as Lazy
 import qualified Data.Text.Lazy.Encoding as Lazy
 import Numeric (showFFloat, showHex)
+
+import Behavior.Internal.Core.Seconds (Seconds (..))
 
 -- | The bytes. Control characters, characters that change the direction of a text, and @<@, @>@
 -- and @&@ are written as escapes: outside of its texts, JSON contains none of them.
@@ -66,3 +69,10 @@ number x
   | otherwise = unsafeToEncoding (string7 (show x))
  where
   whole = truncate x :: Integer
+
+-- | A time in whole nanoseconds. Infinite ones, and those of damaged recordings, are limited to what fits a number of
+-- 64 bits: some 126 years.
+nanoseconds :: Seconds -> Integer
+nanoseconds (Seconds t)
+  | isNaN t = 0
+  | otherwise = round (max (-4e9) (min 4e9 t) * 1e9)

@@ -15,7 +15,6 @@ import Data.List (foldl', intersperse, sortOn)
 import Data.Maybe (listToMaybe)
 import qualified Data.Set as Set
 
-import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Trace
 import Behavior.Trace.Describe
 import Behavior.Trace.Json
@@ -156,12 +155,6 @@ stoppedBy :: Node -> Maybe Int
 stoppedBy n = case nodeEnd n of
   Just (_, StoppedBy (SignalChanged reaction _)) -> Just reaction
   _ -> Nothing
-
--- Infinite times and such of damaged recordings are limited to what fits a number of 64 bits.
-nanoseconds :: Seconds -> Integer
-nanoseconds (Seconds t)
-  | isNaN t = 0
-  | otherwise = round (max (-4e9) (min 4e9 t) * 1e9)
 
 process :: Encoding
 process =
