@@ -5,6 +5,7 @@ judge.py ROW...: BROWSER is the folder with the robot (test/Browser.hs). A line 
 any has failed. No row waits for a time to pass: each waits for what it looks for, and gives up after a limit.
 """
 
+import collections
 import json
 import os
 import signal
@@ -16,7 +17,7 @@ import unicodedata
 
 from browser import Browser, delays
 from claims import all_of, at_most, claim, end, percentile
-from readers import Silent, ask, connections, tunnel, upgrade, reading
+from readers import Silent, ask, connections, reading, serving, tunnel, upgrade
 from robot import FOLDER, Robot, running, until
 
 
@@ -190,6 +191,64 @@ def row_6():
         print(f"row 6: {len(late)} values; the median came after {statistics.median(late) * 1000:.0f} ms")
         at_most(6, "the others' delay, at most", max(late), 0.25)
         claim(6, "the other reader", browser.state(), "live", browser.state() == "live")
+
+
+def row_11():
+    """Other programs read what is made of a trace."""
+    with Robot("work") as robot:
+        robot.tell("order dock")
+        until(lambda: any(e.get("name") == "dock" for e in robot.recorded()), 5, "dock")
+        robot.end()
+    for file in (robot.file, "test/golden/mission.jsonl", "test/golden/detailed.jsonl"):
+        made = f"{FOLDER}/otlp.json"
+        subprocess.run([FOLDER + "/behavior-trace", file, "--otlp", made], check=True)
+        with open(made + ".read", "w") as read:
+            subprocess.run([FOLDER + "/otlp", made], stdout=read, check=True)
+        said = subprocess.run([sys.executable, "test/browser/otlp.py", file, made + ".read"], text=True,
+                              stdout=subprocess.PIPE)
+        print(said.stdout, end="")
+        claim(11, f"OTLP of {os.path.basename(file)}", f"exit code {said.returncode}", "0", said.returncode == 0)
+    in_speedscope("test/golden/mission.jsonl")
+
+
+def in_speedscope(file):
+    """Its tables have each name of the trace, with its duration: a table for each lane."""
+    with open(file) as lines:
+        events = [json.loads(line) for line in lines][1:]
+    last = max(e[time] for e in events for time in ("began", "ended", "time") if time in e)
+    spans = {e["number"]: e for e in events if e.get("kind") == "named"}
+    wanted = collections.Counter()
+    for span in spans.values():
+        wanted[span["name"]] += span.get("ended", last) - span["began"]
+    root = FOLDER + "/node_modules/speedscope/dist/release"
+    subprocess.run([FOLDER + "/behavior-trace", file, "--trace-events", root + "/trace.json"], check=True)
+    with serving(root) as address, Browser() as browser:
+        browser.driver.get(address + "index.html#profileURL=/trace.json")
+        until(lambda: "tid" in browser.text("body"), 10, "the profile")
+        lanes = int(browser.text("body").split("(1/")[1].split(")")[0])
+        press(browser, "3") # its tables
+        found = collections.Counter()
+        for lane in range(1, lanes + 1):
+            until(lambda: f"({lane}/{lanes})" in browser.text("body"), 5, f"lane {lane}")
+            for row in until(lambda: rows_of(browser), 5, "the table"):
+                total, *_, name = row
+                found[name] += in_seconds(total.split()[0])
+            press(browser, "n")
+        right = [name for name in wanted if abs(found[name] - wanted[name]) <= 0.006 * lanes]
+        all_of(11, f"names in {lanes} lanes of speedscope, with the durations of the trace", right, wanted, 5)
+        claim(11, "other names", sorted(set(found) - set(wanted)), "none", set(found) <= set(wanted))
+
+
+def rows_of(browser):
+    """What is in the rows of its table, which is times and a name."""
+    rows = [[word for word in text.replace("\n", "\t").split("\t") if word]
+            for text in browser.js("[...document.querySelectorAll('tr')].map((r) => r.innerText)")]
+    return [row for row in rows if len(row) > 2 and row[0][0].isdigit()]
+
+
+def in_seconds(text):
+    number = float(text.rstrip("nµmsin"))
+    return number * {"s": 1, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9, "min": 60}[text.lstrip("0123456789.")]
 
 
 def row_12():

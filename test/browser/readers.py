@@ -2,6 +2,8 @@
 
 import base64
 import contextlib
+import functools
+import http.server
 import json
 import os
 import socket
@@ -65,6 +67,19 @@ def tunnel(port):
         yield listening.getsockname()[1]
     finally:
         listening.close()
+
+
+@contextlib.contextmanager
+def serving(folder):
+    """The address at which the files of the folder are served."""
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=folder)) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()
 
 
 def connections(port):
