@@ -82,12 +82,12 @@ modes =
   writing name render what = Write render <$> strOption (long name <> metavar "OUT" <> help what)
 
 perform :: FilePath -> Mode -> (Header, [Event], [String]) -> ExceptT String IO (String, [String])
-perform file mode (header, events, remarks) = case mode of
+perform file mode (zero, events, remarks) = case mode of
   Print render -> pure (render (recording events), remarks)
   Write render out -> do
     same <- attempt ((==) <$> canonicalizePath file <*> canonicalizePath out)
     when same (throwE (inert out ++ ": this is the file of the trace; allowed: another file"))
-    attempt (Lazy.writeFile out (render (takeBaseName file) header (recording events)))
+    attempt (Lazy.writeFile out (render (takeBaseName file) zero (recording events)))
     pure ("", remarks)
   Compare other -> do
     (_, otherEvents, otherRemarks) <- load other
@@ -100,7 +100,7 @@ load file = do
   parsed <- attempt (Lazy.readFile file >>= evaluate . parseTrace)
   case parsed of
     Left problem -> throwE (inert file ++ ": " ++ explainTraceError problem)
-    Right (header, events, torn) -> pure (header, events, maybe [] (pure . remark) torn)
+    Right (zero, events, torn) -> pure (zero, events, maybe [] (pure . remark) torn)
  where
   remark (TornLine n bytes) =
     inert file ++ ": line " ++ show n ++ ": incomplete (" ++ show bytes

@@ -101,8 +101,8 @@ spec = do
     let low = StoppedBy (SignalChanged 9 [])
         stopped = ended 1 Top "a" 0 Nothing 1 low ++ ended 4 (Inside 1) "d" 0 Nothing 1 low
         started = ended 2 Top "b" 1 (Just 9) 2 Succeeded ++ ended 3 Top "c" 1 (Just 9) 2 Succeeded
-        links events = fmap (\spans -> [(sName s, l) | s <- spans, l <- named spans s]) (parsed (render events))
-        named spans s = [sName t | l <- sLinks s, t <- spans, sId t == l]
+        links events = fmap (\spans -> [(sName s, l) | s <- spans, l <- stoppedOf spans s]) (parsed (render events))
+        stoppedOf spans s = [sName t | l <- sLinks s, t <- spans, sId t == l]
     links (stopped ++ started) `shouldBe` Right [("b", "a"), ("c", "a")]
     links started `shouldBe` Right []
     links stopped `shouldBe` Right []

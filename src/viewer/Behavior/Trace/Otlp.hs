@@ -11,7 +11,6 @@ import Data.Aeson.Encoding (Encoding, Series, int, list, pair, pairs)
 import Data.Bits (shiftR, xor, (.|.))
 import Data.ByteString.Builder (toLazyByteString)
 import qualified Data.ByteString.Lazy as Lazy
-import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
 import Data.List (intersperse, mapAccumL)
 import qualified Data.Map.Strict as Map
@@ -64,11 +63,11 @@ renderOtlp service header r =
  where
   resource = [textual "service.name" (nameText service), whole "behavior.lost" (recordingLost r)]
   spans = foldr (below Nothing) (map (alone shared) outside) (recordingRoots r)
-  below parent n rest = spanOf shared r parent inside links n : foldr (below (Just (number n))) rest (nodeChildren n)
+  below parent n rest = spanOf shared r parent inside links n : foldr (below (Just k)) rest (nodeChildren n)
    where
-    inside = IntMap.findWithDefault [] (number n) reactions
-    links = IntMap.lookup (number n) interruptions
-  number = spanNumber . nodeSpan
+    k = spanNumber (nodeSpan n)
+    inside = IntMap.findWithDefault [] k reactions
+    links = IntMap.lookup k interruptions
   (outside, reactions) = reactionsInside r
   shared = sharedBy (zeroTime header)
   -- From what a reaction started to the first span that it stopped, with the reaction: by the started one's number.
@@ -155,9 +154,9 @@ alone shared x =
   time = nanoseconds (reactionTime x)
 
 identified :: Shared -> Maybe Int -> Int -> String -> Integer -> Integer -> Series
-identified shared parent number name begin end =
+identified shared parent n name begin end =
   pair "traceId" (traceId shared)
-    <> pair "spanId" (spanId shared number)
+    <> pair "spanId" (spanId shared n)
     <> maybe mempty (pair "parentSpanId" . spanId shared) parent
     <> pair "name" (text (nameText name))
     -- SPAN_KIND_INTERNAL: no part of it is on another machine.
