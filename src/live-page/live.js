@@ -299,7 +299,8 @@ function sentence(reaction) {
   const [was, is] = [stoppedBy.get(reaction.number), startedBy.get(reaction.number)];
   const effects = [];
   if (reaction.stopped) {
-    effects.push(`stopped ${inert((was ?? reaction.stopped).name, 60)} after ${during(reaction.stopped.after)}`);
+    const [name, after] = was ? [was.name, reaction.time - was.began] : [reaction.stopped.name, reaction.stopped.after];
+    effects.push(`stopped ${inert(name, 60)} after ${during(after)}`);
   }
   if (is || reaction.starts) effects.push(`starts ${inert(is ? is.name : reaction.starts, 60)}`);
   return `${reaction.time.toFixed(1)} s: ${causes}: ${effects.join(", ") || "nothing starts"}`;
@@ -354,12 +355,12 @@ function showSignals(time) {
 
 const laneHeight = 18;
 const mostLanes = 60;
-let seconds = 10; // that the timeline shows
+let seconds = 1; // that the timeline shows
 
 function barsAt(time) {
   let first = time;
   for (const span of spans.values()) first = Math.min(first, span.began);
-  seconds = Math.min(mostSeconds, Math.max(10, time - first));
+  seconds = Math.min(mostSeconds, Math.max(1, time - first));
   const isShown = (span) => span.kind === "named" && span.began <= time && (span.ended ?? time) >= time - seconds;
   return [...spans.values()].filter((span) => isShown(span) && wanted(span));
 }
@@ -389,9 +390,10 @@ function draw() {
     const key = `${span.parent} ${span.name}`;
     let lane = lanesInside.get(key);
     if (!lane) {
-      const path = pathOf(span).join(" / ");
-      if (!lanes.has(path)) lanes.set(path, []);
-      lane = lanes.get(path);
+      const names = pathOf(span);
+      const path = names.join(" / ");
+      if (!lanes.has(path)) lanes.set(path, { label: "\u2002".repeat(names.length - 1) + names.pop(), bars: [] });
+      lane = lanes.get(path).bars;
       lanesInside.set(key, lane);
     }
     lane.push(span);
@@ -400,7 +402,7 @@ function draw() {
   const g = canvas.getContext("2d");
   const font = "12px system-ui, sans-serif";
   g.font = font;
-  const labels = rows.map(([, some]) => inert(some[0].name, 40));
+  const labels = rows.map(([, lane]) => lane.label);
   const wide = canvas.clientWidth;
   const left = Math.min(0.4 * wide, 12 + Math.max(0, ...labels.map((label) => g.measureText(label).width)));
   const high = laneHeight * (rows.length + 1) + 4;
@@ -419,12 +421,12 @@ function draw() {
   g.font = font;
   drawAxis(g, x, time, wide, high, colours);
   drawn = [];
-  rows.forEach(([, some], i) => {
+  rows.forEach(([, lane], i) => {
     const top = 2 + laneHeight * i;
     g.fillStyle = colours.text;
     g.fillText(labels[i], 2, top + 12, left - 6);
     const painted = new Map(); // the outcome of what is narrower than a pixel, by its place
-    for (const span of some) {
+    for (const span of lane.bars) {
       const [from, to] = [x(span.began), x(Math.min(span.ended ?? time, time))];
       const how = span.end && span.ended <= time ? outcomeOf(span) : "running";
       if (to - from < 1) {
@@ -442,15 +444,15 @@ function draw() {
   });
 }
 
-// Lines at whole seconds, at most eight of them.
+// Lines at round times, at most eight of them.
 function drawAxis(g, x, time, wide, high, colours) {
-  const step = [1, 2, 5, 10, 20].find((s) => seconds / s <= 8);
+  const step = [0.2, 0.5, 1, 2, 5, 10, 20].find((s) => seconds / s <= 8);
   for (let t = step * Math.ceil((time - seconds) / step); t <= time; t += step) {
     if (t < 0) continue;
     g.fillStyle = colours.line;
     g.fillRect(Math.round(x(t)), 0, 1, high);
     g.fillStyle = colours.text;
-    const label = `${t} s`;
+    const label = `${step < 1 ? t.toFixed(1) : t} s`;
     g.fillText(label, Math.min(x(t) + 3, wide - g.measureText(label).width), high - 5);
   }
 }
