@@ -17,6 +17,7 @@ import qualified Examples.ProgressProblemSpec
 import qualified Examples.RosMissionSpec
 import qualified Examples.TestingARobotSpec
 import qualified Examples.YourOwnMonadSpec
+import qualified Live.FollowingSpec
 import qualified Live.HistorySpec
 import qualified Live.ServerSpec
 import qualified Promises.PromisesSimSpec
@@ -66,3 +67,4 @@ main = hspec $ do
   describe "The live page" $ do
     Live.HistorySpec.spec
     Live.ServerSpec.spec
+    describe "A trace file" Live.FollowingSpec.spec

@@ -15,8 +15,11 @@ import Data.Text.Lazy.Encoding (encodeUtf8)
 import Options.Applicative
 import System.Directory (canonicalizePath)
 import System.Exit (ExitCode (..))
-import System.FilePath (takeBaseName)
+import System.FilePath (takeBaseName, takeFileName)
 
+import Behavior (runBehavior, sleep)
+import Behavior.Live (LivePage (..), loopback)
+import Behavior.Live.Internal.Following (showFile)
 import Behavior.Trace (Event)
 import Behavior.Trace.Describe (inert)
 import Behavior.Trace.Diff
@@ -37,13 +40,15 @@ data Mode
     Write (String -> Header -> Recording -> Lazy.ByteString) FilePath
   | -- | Compares with another file.
     Compare FilePath
+  | -- | Shows it on a page.
+    Live
 
 -- | Runs the program with these arguments. The result is its exit status, and what it prints on the
 -- standard output and on the standard error output.
 run :: [String] -> IO (ExitCode, String, String)
 run arguments = case execParserPure defaultPrefs commandLine arguments of
   Success (Options file mode) -> do
-    result <- runExceptT (load file >>= perform file mode)
+    result <- runExceptT (perform file mode)
     pure $ case result of
       Left problem -> (ExitFailure 2, "", problem ++ "\n")
       Right (printed, remarks) -> (ExitSuccess, printed, unlines remarks)
@@ -77,21 +82,30 @@ modes =
       "write the trace-event format, for Perfetto, Chrome and speedscope"
     <|> writing "otlp" renderOtlp "write a trace of OpenTelemetry (OTLP in JSON), for its collector, Jaeger and Tempo"
     <|> Compare <$> strOption (long "diff" <> metavar "OTHER" <> help "print what another trace has differently")
+    <|> flag'
+      Live
+      (long "live" <> help "serve a page that shows it in a browser, also while it is written, until Ctrl-C")
  where
   ofRecording render _ _ = render
   writing name render what = Write render <$> strOption (long name <> metavar "OUT" <> help what)
 
-perform :: FilePath -> Mode -> (Header, [Event], [String]) -> ExceptT String IO (String, [String])
-perform file mode (zero, events, remarks) = case mode of
-  Print render -> pure (render (recording events), remarks)
+perform :: FilePath -> Mode -> ExceptT String IO (String, [String])
+perform file mode = case mode of
+  Print render -> do
+    (_, events, remarks) <- load file
+    pure (render (recording events), remarks)
   Write render out -> do
+    (zero, events, remarks) <- load file
     same <- attempt ((==) <$> canonicalizePath file <*> canonicalizePath out)
     when same (throwE (inert out ++ ": this is the file of the trace; allowed: another file"))
     attempt (Lazy.writeFile out (render (takeBaseName file) zero (recording events)))
     pure ("", remarks)
   Compare other -> do
+    (_, events, remarks) <- load file
     (_, otherEvents, otherRemarks) <- load other
     pure (renderDifference (difference (recording events) (recording otherEvents)), remarks ++ otherRemarks)
+  Live ->
+    attempt (runBehavior (showFile (sleep 0.1) loopback {robot = takeFileName file} file)) >>= throwE
 
 -- The header and the events of a file, and a remark if its last line is incomplete.
 load :: FilePath -> ExceptT String IO (Header, [Event], [String])

@@ -4,19 +4,15 @@
 -- The live page over a socket of this machine.
 module Live.ServerSpec (spec) where
 
-import Control.Concurrent (yield)
 import Control.Concurrent.Async (concurrently, mapConcurrently, withAsync)
 import Control.Concurrent.STM
-import Control.Exception (Handler (..), IOException, bracket, catches, evaluate, onException, try)
+import Control.Exception (Handler (..), catches, evaluate, try)
 import Control.Monad (forM_, replicateM_, (>=>))
-import Data.Aeson (Value (..), eitherDecode, encode, object, (.=))
-import qualified Data.Aeson.Key as Key
-import Data.Aeson.Types (FromJSON, parseMaybe, withObject, (.:))
+import Data.Aeson (Value (..), encode, object, (.=))
 import Data.Bifunctor (bimap)
 import qualified Data.ByteString.Char8 as Char8
 import qualified Data.ByteString.Lazy as Bytes
 import Data.List (isInfixOf, isPrefixOf)
-import Data.Maybe (fromMaybe)
 import Data.Text (Text)
 import qualified Data.Text as Text
 import Data.Time.Clock.POSIX (posixSecondsToUTCTime)
@@ -31,8 +27,9 @@ import Behavior.Live
 import Behavior.Live.Internal.History (defaultLimits, nextNumber)
 import Behavior.Live.Internal.Protocol
 import Behavior.Live.Internal.Server hiding (pending)
+import Behavior.Time (now)
 import Behavior.Trace
-import Behavior.Trace.Format (decodeEvent)
+import Live.Reader
 import Viewer.Examples (interrupted, mission)
 
 spec :: Spec
@@ -142,14 +139,24 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
           atomically (putTMVar ready ())
           untilOver connection)
       seen `shouldSatisfy` any (\m -> "\"name\":\"wave\"" `isInfixOf` m && "\"ended\"" `isInfixOf` m)
+    it "has times that are relative to when it began" $ do
+      port <- freePort
+      withLive loopback {pagePort = port} $ \receiving -> do
+        began <- now
+        receiving [Began (Span 1 Top Named "wave" began Nothing)]
+        times <- reading port plainly $ \connection -> do
+          seen <- eventsIn "running" <$> (next connection >> next connection)
+          these <- if null seen then events connection 1 else pure seen
+          latest <- field "now" <$> nextOfAny connection
+          pure (latest : [realToFrac (spanBegan s) | Began s <- these])
+        times `shouldSatisfy` all (\t -> t >= 0 && t < (60 :: Double))
  where
   one = 1 :: Int
-  plainly = object ["version" .= one]
 
 -- A page with what is needed for it, and its port.
 serving :: Maybe Text -> (Shown -> Int -> IO a) -> IO a
 serving secret use = do
-  shown <- newShown defaultLimits (Run "Ann" "run" (posixSecondsToUTCTime 0)) 0 secret True
+  shown <- newShown defaultLimits (Run "Ann" "run" (posixSecondsToUTCTime 0)) (const (pure 0)) secret True
   withAsync (publishing shown) $ \_ -> testWithApplication (pure (application shown)) (use shown)
 
 -- Returns when they are in chunks.
@@ -158,22 +165,6 @@ tell shown new = do
   before <- nextNumber <$> readTVarIO (history shown)
   receive shown new
   atomically (readTVar (history shown) >>= check . (>= before + length new) . nextNumber)
-
-local :: Int -> Websockets.Headers
-local port = [("Origin", Char8.pack ("http://127.0.0.1:" ++ show port))]
-
--- Over a connection that has attached itself so.
-reading :: Int -> Value -> (Websockets.Connection -> IO a) -> IO a
-reading port = attachedBy port (local port)
-
-attachedBy :: Int -> Websockets.Headers -> Value -> (Websockets.Connection -> IO a) -> IO a
-attachedBy port headers said use =
-  withConnection port $ \s ->
-    Websockets.runClientWithSocket s host "/live" Websockets.defaultConnectionOptions others $ \connection ->
-      Websockets.sendTextData connection (encode said) >> use connection
- where
-  host = maybe ("127.0.0.1:" ++ show port) Char8.unpack (lookup "Host" headers)
-  others = filter ((/= "Host") . fst) headers
 
 -- The kind of the first message, or why there is none.
 attached :: Int -> Websockets.Headers -> Value -> IO (Either String String)
@@ -188,30 +179,6 @@ attached port headers said =
 firstFrom :: Int -> Websockets.Headers -> Value -> IO String
 firstFrom port headers said = either id id <$> attached port headers said
 
--- The next message; and the next that is no beat.
-nextOfAny, next :: Websockets.Connection -> IO Value
-nextOfAny connection = Websockets.receiveData connection >>= either fail pure . eitherDecode
-next connection = nextOfAny connection >>= \m -> if message m == "beat" then next connection else pure m
-
-message :: Value -> String
-message = Text.unpack . field "message"
-
-field :: FromJSON a => Text -> Value -> a
-field name = fromMaybe (error ("no field " ++ show name)) . parseMaybe (withObject "message" (.: Key.fromText name))
-
-followBy :: [String] -> Websockets.Connection -> IO ()
-followBy kinds connection = forM_ kinds $ \kind -> message <$> next connection `shouldReturn` kind
-
--- This number of events, as they come.
-events :: Websockets.Connection -> Int -> IO [Event]
-events connection n
-  | n <= 0 = pure []
-  | otherwise = do
-      m <- next connection
-      message m `shouldBe` "events"
-      let these = map (either (error . show) id . decodeEvent . encode) (field "events" m :: [Value])
-      (these ++) <$> events connection (n - length these)
-
 countEvents :: Websockets.Connection -> Int -> IO Int
 countEvents connection n
   | n <= 0 = pure 0
@@ -224,20 +191,6 @@ untilOver :: Websockets.Connection -> IO [String]
 untilOver connection = do
   m <- next connection
   if message m == "over" then pure [] else (Char8.unpack (Bytes.toStrict (encode m)) :) <$> untilOver connection
-
--- Again until there is a server.
-reachable :: Int -> IO a -> IO a
-reachable port act = try (withConnection port (const (pure ()))) >>= either again (const act)
- where
-  again e = evaluate (e :: IOException) >> yield >> reachable port act
-
-withConnection :: Int -> (Socket -> IO a) -> IO a
-withConnection port = bracket open close
- where
-  open = do
-    s <- socket AF_INET Stream defaultProtocol
-    connect s (SockAddrInet (fromIntegral port) (tupleToHostAddress (127, 0, 0, 1))) `onException` close s
-    pure s
 
 -- What the server answers to a request for the page under this name.
 page :: Int -> Char8.ByteString -> IO String

@@ -75,6 +75,10 @@ spec = around withMissions $ do
     run [folder, "--tree"] >>= failsWith folder
     forM_ ["--trace-events", "--otlp", "--svg"] $ \option ->
       run [folder </> "mission", option, folder </> "none" </> "out"] >>= failsWith "out"
+  it "shows no page of what is no trace, with status 2" $ \folder -> do
+    run [folder </> "none", "--live"] >>= failsWith "none"
+    Bytes.writeFile (folder </> "other") "hello\n"
+    run [folder </> "other", "--live"] >>= failsWith "other: line 1: this is no trace"
   it "refuses other options, with status 2" $ \folder ->
     forM_
       [ []
@@ -87,8 +91,8 @@ spec = around withMissions $ do
   it "explains its options" $ \_ -> do
     (status, printed, _) <- run ["--help"]
     status `shouldBe` ExitSuccess
-    forM_ ["--tree", "--summary", "--svg OUT", "--trace-events OUT", "--otlp OUT", "--diff OTHER"] $ \option ->
-      printed `shouldSatisfy` isInfixOf option
+    let options = ["--tree", "--summary", "--svg OUT", "--trace-events OUT", "--otlp OUT", "--diff OTHER", "--live"]
+    forM_ options $ \option -> printed `shouldSatisfy` isInfixOf option
  where
   failsWith why (status, printed, remarks) = do
     (status, printed) `shouldBe` (ExitFailure 2, "")

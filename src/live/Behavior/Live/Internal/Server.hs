@@ -33,7 +33,7 @@ import Network.WebSockets (ConnectionOptions (..), SizeLimit (..), defaultConnec
 import qualified Network.WebSockets as Websockets
 import System.Timeout (timeout)
 
-import Behavior.Internal.Core.Seconds (Seconds (..))
+import Behavior.Internal.Core.Seconds (Seconds)
 import Behavior.Internal.Nesting (nestsDeeperThan)
 import Behavior.Internal.Spans.Event (traverseTexts)
 import Behavior.Live.Internal.Access
@@ -41,13 +41,12 @@ import Behavior.Live.Internal.History
 import Behavior.Live.Internal.Page
 import Behavior.Live.Internal.Protocol
 import Behavior.Trace (Event)
-import Behavior.Trace.File (relativeTo)
 
 -- | What is shown, and to how many.
 data Shown = Shown
   { run :: Run
-  , zero :: Seconds
-  -- ^ The time of 'Behavior.Time.now' at which the times of the events are 0.
+  , clock :: History -> IO Seconds
+  -- ^ What time it is, relative to the zero of the run, if this is known.
   , token :: Maybe Text
   , onlyHere :: Bool
   -- ^ Whether only this machine reaches it.
@@ -62,25 +61,26 @@ data Shown = Shown
   , readers :: TVar Int
   }
 
--- | With nothing in it: how much is kept, the run, its zero, the token, and whether only this machine reaches it.
-newShown :: Limits -> Run -> Seconds -> Maybe Text -> Bool -> IO Shown
-newShown most this start secret here =
-  Shown this start secret here most
+-- | With nothing in it: how much is kept, the run, its clock, the token, and whether only this machine reaches it.
+newShown :: Limits -> Run -> (History -> IO Seconds) -> Maybe Text -> Bool -> IO Shown
+newShown most this time secret here =
+  Shown this time secret here most
     <$> newTVarIO (0, [])
     <*> newTVarIO noHistory
     <*> newTVarIO False
     <*> newTVarIO False
     <*> newTVarIO 0
 
--- | Takes the next events of the trace; when too many of those before are in no chunk yet, it waits (so what is too
--- much is counted as lost by the trace). Of each text a page needs no more than its first 1,000 characters.
+-- | Takes the next events of the trace, whose times are relative to the zero of the run; when too many of those before
+-- are in no chunk yet, it waits (so what is too much is counted as lost by the trace). Of each text a page needs no more
+-- than its first 1,000 characters.
 receive :: Shown -> [Event] -> IO ()
 receive shown events = do
-  relative <- traverse (traverseTexts shortened . relativeTo (zero shown)) events
+  short <- traverse (traverseTexts shortened) events
   atomically $ do
     (count, before) <- readTVar (pending shown)
     check (count < mostEvents (limits shown))
-    writeTVar (pending shown) (count + length relative, reverse relative ++ before)
+    writeTVar (pending shown) (count + length short, reverse short ++ before)
 
 -- (Evaluated to its end, so that nothing longer is kept.)
 shortened :: String -> IO String
@@ -215,5 +215,5 @@ telling shown say wanted = do
       Nothing -> whole after
     if complete then atTime over after else follow latestBeat cursor'
   whole current = nextNumber current <$ atTime snapshotMessage current
-  atTime message current = getMonotonicTime >>= \t -> say (message (Seconds t - zero shown) current)
+  atTime message current = clock shown current >>= \t -> say (message t current)
   beatEvery = 0.3

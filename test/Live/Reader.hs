@@ -1,0 +1,112 @@
+{-# LANGUAGE OverloadedStrings #-}
+
+-- |
+-- A reader of a live page, over a socket of this machine.
+module Live.Reader
+  ( -- * Connections
+    reading
+  , attachedBy
+  , plainly
+  , local
+  , freePort
+  , reachable
+  , withConnection
+
+    -- * Messages
+  , next
+  , nextOfAny
+  , message
+  , field
+  , followBy
+  , events
+  , eventsIn
+  ) where
+
+import Control.Concurrent (yield)
+import Control.Exception (IOException, bracket, evaluate, onException, try)
+import Control.Monad (forM_)
+import Data.Aeson (Value, eitherDecode, encode, object, (.=))
+import qualified Data.Aeson.Key as Key
+import Data.Aeson.Types (FromJSON, parseMaybe, withObject, (.:))
+import qualified Data.ByteString.Char8 as Char8
+import Data.Maybe (fromMaybe)
+import Data.Text (Text)
+import qualified Data.Text as Text
+import Network.Socket
+import Network.Wai.Handler.Warp (openFreePort)
+import qualified Network.WebSockets as Websockets
+import Test.Hspec (shouldBe, shouldReturn)
+
+import Behavior.Trace
+import Behavior.Trace.Format (decodeEvent)
+
+-- | What a browser of this machine sends.
+local :: Int -> Websockets.Headers
+local port = [("Origin", Char8.pack ("http://127.0.0.1:" ++ show port))]
+
+-- | What a reader says that knows nothing yet.
+plainly :: Value
+plainly = object ["version" .= (1 :: Int)]
+
+-- | Over a connection that has attached itself so.
+reading :: Int -> Value -> (Websockets.Connection -> IO a) -> IO a
+reading port = attachedBy port (local port)
+
+-- | The same with these headers.
+attachedBy :: Int -> Websockets.Headers -> Value -> (Websockets.Connection -> IO a) -> IO a
+attachedBy port headers said use =
+  withConnection port $ \s ->
+    Websockets.runClientWithSocket s host "/live" Websockets.defaultConnectionOptions others $ \connection ->
+      Websockets.sendTextData connection (encode said) >> use connection
+ where
+  host = maybe ("127.0.0.1:" ++ show port) Char8.unpack (lookup "Host" headers)
+  others = filter ((/= "Host") . fst) headers
+
+-- | The next message; and the next that is no beat.
+nextOfAny, next :: Websockets.Connection -> IO Value
+nextOfAny connection = Websockets.receiveData connection >>= either fail pure . eitherDecode
+next connection = nextOfAny connection >>= \m -> if message m == "beat" then next connection else pure m
+
+-- | Its kind.
+message :: Value -> String
+message = Text.unpack . field "message"
+
+-- | What it has there.
+field :: FromJSON a => Text -> Value -> a
+field name = fromMaybe (error ("no field " ++ show name)) . parseMaybe (withObject "message" (.: Key.fromText name))
+
+-- | The next messages are of these kinds.
+followBy :: [String] -> Websockets.Connection -> IO ()
+followBy kinds connection = forM_ kinds $ \kind -> message <$> next connection `shouldReturn` kind
+
+-- | This number of events, as they come.
+events :: Websockets.Connection -> Int -> IO [Event]
+events connection n
+  | n <= 0 = pure []
+  | otherwise = do
+      m <- next connection
+      message m `shouldBe` "events"
+      (eventsIn "events" m ++) <$> events connection (n - length (eventsIn "events" m))
+
+-- | The events that it has there.
+eventsIn :: Text -> Value -> [Event]
+eventsIn name m = map (either (error . show) id . decodeEvent . encode) (field name m :: [Value])
+
+-- | A port that is free.
+freePort :: IO Int
+freePort = bracket openFreePort (close . snd) (pure . fst)
+
+-- | Again until there is a server.
+reachable :: Int -> IO a -> IO a
+reachable port act = try (withConnection port (const (pure ()))) >>= either again (const act)
+ where
+  again e = evaluate (e :: IOException) >> yield >> reachable port act
+
+-- | Over a connection.
+withConnection :: Int -> (Socket -> IO a) -> IO a
+withConnection port = bracket open close
+ where
+  open = do
+    s <- socket AF_INET Stream defaultProtocol
+    connect s (SockAddrInet (fromIntegral port) (tupleToHostAddress (127, 0, 0, 1))) `onException` close s
+    pure s
