@@ -101,7 +101,9 @@ operators title = Group title "-N1 -A4m"
 
 livePage :: Group
 livePage =
-  Group "A reaction in a trace, with a live page: microseconds" "-I0 -A16m -qm -N1" $
+  Group
+    "A reaction in a trace, with a live page: microseconds"
+    "-I0 -A16m -qm -N1"
     [ "live reaction, 10 readers" `within` 1.25 `times` "live reaction, no reader"
     , "live reaction, no reader" `beside` "live reaction, no page"
     ]

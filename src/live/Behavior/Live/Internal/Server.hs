@@ -72,8 +72,8 @@ newShown most this time secret here =
     <*> newTVarIO 0
 
 -- | Takes the next events of the trace, whose times are relative to the zero of the run; when too many of those before
--- are in no chunk yet, it waits (so what is too much is counted as lost by the trace). Of each text a page needs no more
--- than its first 1,000 characters.
+-- are in no chunk yet, it waits (so what is too much is counted as lost by the trace). Of each text a page needs no
+-- more than its first 1,000 characters.
 receive :: Shown -> [Event] -> IO ()
 receive shown events = do
   short <- traverse (traverseTexts shortened) events
