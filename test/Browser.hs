@@ -5,7 +5,7 @@
 -- argument, and then lines on its standard input; it ends when that ends.
 --
 -- > browser work PORT FILE     -- FILE is its own record: a trace file
--- > browser flood PORT RATE    -- so many events a second, until the next line
+-- > browser flood PORT RATE    -- RATE events a second, until the next line
 -- > browser hostile PORT FILE
 -- > browser secret PORT        -- its page has the token "a secret"
 -- > browser open PORT          -- it would serve its page to other machines, without a token

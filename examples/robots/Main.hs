@@ -11,7 +11,7 @@ import System.Exit (die)
 import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
-import Behavior.Live (Viewing (..), viewEvents, viewing)
+import Behavior.Live (LivePage (robot), Viewing (..), viewEvents, viewing)
 import Behavior.Message (withInbox)
 import Behavior.STM
 import qualified Behavior.Signal as Signal
@@ -58,11 +58,13 @@ commandLine =
       <> progDesc "Runs a robot with simulated hardware, for some seconds: it prints what it does."
  where
   options =
-    Options
+    onItsPage
       <$> argument (eitherReader chosen) (metavar "ROBOT" <> help names)
       <*> switch (long "simulate" <> help "run it in virtual time")
       <*> viewingOptions "robot"
-  chosen name = maybe (Left ("not a robot: " ++ show name ++ "; allowed: " ++ names)) Right (lookup name demos)
+  chosen name =
+    maybe (Left ("not a robot: " ++ show name ++ "; allowed: " ++ names)) (Right . (,) name) (lookup name demos)
+  onItsPage (name, run) simulated v = Options run simulated v {livePage = (\page -> page {robot = name}) <$> livePage v}
   names = intercalate ", " (map fst demos)
 
 demos :: [(String, (String -> Behavior ()) -> Behavior ())]
@@ -156,7 +158,7 @@ fleetDemo say = do
   chargers <- atomically (newTSem 1)
   handedOver <- newTVarIO (0 :: Int)
   let tell who text = say (who ++ ": " ++ text)
-      robot who lowAt = do
+      robotOf who lowAt = do
         low <- condition world (who ++ ": battery low") [(0, False), (lowAt, True)]
         pure
           Robot
@@ -171,7 +173,7 @@ fleetDemo say = do
             , Fleet.batteryLow = signal low
             , Fleet.withdrawn = pure False
             }
-  robots <- traverse (uncurry robot) [("Ann", 1.4), ("Bo", 60), ("Cid", 1.5)]
+  robots <- traverse (uncurry robotOf) [("Ann", 1.4), ("Bo", 60), ("Cid", 1.5)]
   begin world
   withInbox 10 orders $ \inbox ->
     named "all six orders" (Signal.waitUntil ((== 6) <$> Signal.watching (readTVar handedOver)))

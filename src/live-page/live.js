@@ -5,6 +5,7 @@
 const mostSpans = 20000; // that have ended
 const mostReactions = 2000;
 const mostRows = 300; // in a list
+const mostLanes = 60; // of the timeline
 const mostSeconds = 60; // of the timeline
 const mostSilence = 900; // milliseconds
 const $ = (id) => document.getElementById(id);
@@ -284,7 +285,7 @@ function showTree(time) {
   };
   walk(0, 0);
   fill($("tree"), rows, detailedRow, (row, { span, depth }) => {
-    writeSpan(row, { ...span, end: undefined }, `for ${during(time - span.began)}`);
+    writeSpan(row, { ...span, end: undefined }, `since ${span.began.toFixed(1)} s, for ${during(time - span.began)}`);
     row.style.paddingLeft = `${Math.min(depth, 12)}rem`;
   });
 }
@@ -294,7 +295,8 @@ function changeText(change) {
   return `${inert(change.signal, 60)} ${inert(change.after, 60)}${was}`;
 }
 
-function sentence(reaction) {
+// What a reaction says: when, why, and what it did.
+function partsOf(reaction) {
   const causes = reaction.changes.map(changeText).join(" → ") || inert(reaction.operator, 60);
   const [was, is] = [stoppedBy.get(reaction.number), startedBy.get(reaction.number)];
   const effects = [];
@@ -303,20 +305,29 @@ function sentence(reaction) {
     effects.push(`stopped ${inert(name, 60)} after ${during(after)}`);
   }
   if (is || reaction.starts) effects.push(`starts ${inert(is ? is.name : reaction.starts, 60)}`);
-  return `${reaction.time.toFixed(1)} s: ${causes}: ${effects.join(", ") || "nothing starts"}`;
+  return [`${reaction.time.toFixed(1)} s: `, causes, `: ${effects.join(", ") || "nothing starts"}`];
 }
+
+const sentence = (reaction) => partsOf(reaction).join("");
 
 function showInterruptions(time) {
   const some = reactions.filter((r) => r.stopped && r.time <= time).slice(-20).reverse();
-  fill($("interruptions"), some.map((r) => [String(r.number), r]), detailedRow, (row, r) => {
+  const make = () => {
+    const row = detailedRow();
+    row.firstChild.append(element("span"), element("strong"), element("span"));
+    return row;
+  };
+  fill($("interruptions"), some.map((r) => [String(r.number), r]), make, (row, r) => {
     row.dataset.number = r.number;
-    setText(row.firstChild, sentence(r));
+    partsOf(r).forEach((text, i) => setText(row.firstChild.children[i], text));
   });
 }
 
 function endText(end) {
   if (!end) return "it runs";
-  if (end.how !== "stopped") return end.how + (end.text === undefined ? "" : `: ${inert(end.text)}`);
+  if (end.how !== "stopped") {
+    return end.how + (end.text === undefined ? "" : `: ${inert(end.text.replace("the behaviour failed: ", ""))}`);
+  }
   const cause = end.cause;
   const why = {
     signal: () => cause.changes.map(changeText).join(" → ") || "its signal changed",
@@ -354,7 +365,6 @@ function showSignals(time) {
 // --- The timeline -----------------------------------------------------------
 
 const laneHeight = 18;
-const mostLanes = 60;
 let seconds = 1; // that the timeline shows
 
 function barsAt(time) {
@@ -372,6 +382,36 @@ function showBars(time) {
     writeSpan(row, s, `${outcomeOf(s)}, ${s.began.toFixed(1)} s to ${s.end ? s.ended.toFixed(1) + " s" : "now"}`));
 }
 
+// The bars by path: a lane inside of another comes after it, and otherwise what began first comes first.
+function lanesOf(bars) {
+  const top = { inside: new Map() };
+  const lanes = new Map(); // by parent and name: there are fewer of these than of spans
+  for (const span of bars) {
+    const key = `${span.parent} ${span.name}`;
+    if (!lanes.has(key)) {
+      let lane = top;
+      pathOf(span).forEach((name, depth) => {
+        if (!lane.inside.has(name)) {
+          const label = "\u2002".repeat(depth) + name;
+          lane.inside.set(name, { label, bars: [], began: Infinity, inside: new Map() });
+        }
+        lane = lane.inside.get(name);
+      });
+      lanes.set(key, lane);
+    }
+    const lane = lanes.get(key);
+    lane.bars.push(span);
+    lane.began = Math.min(lane.began, span.began);
+  }
+  const rows = [];
+  const walk = (lane) => {
+    if (rows.length < mostLanes && lane.bars?.length > 0) rows.push(lane);
+    [...lane.inside.values()].sort((a, b) => a.began - b.began).forEach(walk);
+  };
+  walk(top);
+  return rows;
+}
+
 let frame = null;
 let drawn = []; // rectangles and their spans, for clicks
 
@@ -384,25 +424,11 @@ function draw() {
   const time = shownTime();
   const canvas = $("timeline");
   const bars = barsAt(time);
-  const lanes = new Map(); // by path
-  const lanesInside = new Map(); // by parent and name: there are fewer of these than of spans
-  for (const span of bars) {
-    const key = `${span.parent} ${span.name}`;
-    let lane = lanesInside.get(key);
-    if (!lane) {
-      const names = pathOf(span);
-      const path = names.join(" / ");
-      if (!lanes.has(path)) lanes.set(path, { label: "\u2002".repeat(names.length - 1) + names.pop(), bars: [] });
-      lane = lanes.get(path).bars;
-      lanesInside.set(key, lane);
-    }
-    lane.push(span);
-  }
-  const rows = [...lanes].sort(([a], [b]) => (a < b ? -1 : a > b ? 1 : 0)).slice(0, mostLanes);
+  const rows = lanesOf(bars);
   const g = canvas.getContext("2d");
   const font = "12px system-ui, sans-serif";
   g.font = font;
-  const labels = rows.map(([, lane]) => lane.label);
+  const labels = rows.map((lane) => lane.label);
   const wide = canvas.clientWidth;
   const left = Math.min(0.4 * wide, 12 + Math.max(0, ...labels.map((label) => g.measureText(label).width)));
   const high = laneHeight * (rows.length + 1) + 4;
@@ -421,7 +447,7 @@ function draw() {
   g.font = font;
   drawAxis(g, x, time, wide, high, colours);
   drawn = [];
-  rows.forEach(([, lane], i) => {
+  rows.forEach((lane, i) => {
     const top = 2 + laneHeight * i;
     g.fillStyle = colours.text;
     g.fillText(labels[i], 2, top + 12, left - 6);
@@ -533,7 +559,7 @@ $("outcome").addEventListener("change", (event) => {
 });
 
 $("bars").parentElement.addEventListener("toggle", show);
-$("controls").addEventListener("submit", (event) => event.preventDefault());
+document.querySelector("form").addEventListener("submit", (event) => event.preventDefault());
 window.addEventListener("resize", askForFrame);
 
 // What the page holds, as a file that behavior-trace reads.
@@ -560,6 +586,10 @@ function line(event) {
   const unit = (c) => "\\u" + c.charCodeAt(0).toString(16).padStart(4, "0");
   const escaped = (c) => c.split("").map(unit).join("");
   return JSON.stringify(event).replace(/[<>&]/g, escaped).replace(inertly, escaped) + "\n";
+}
+
+for (const [how, mark] of Object.entries(marks)) {
+  $("key").append(element("span", [`${mark} ${how}`], { class: how }), " ");
 }
 
 connect();

@@ -57,7 +57,7 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
         looks
         events connection (length ends) `shouldReturn` ends
         timeNow connection `shouldReturn` 41
-  it "makes place for that of another run" $ forM_ [False, True] $ \isGone ->
+  it "makes place for that of another run" $ forM_ [(True, mended), (False, sideBySide 100)] $ \(isGone, others) ->
     showing [renderTrace header mission] $ \port path looks _ -> do
       first <- reading port plainly $ \connection -> do
         hello <- next connection
@@ -65,14 +65,14 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
         -- (What was there is shown until there is another one.)
         when isGone (removeFile path >> looks)
         concurrently_ (untilOver connection) $ do
-          Bytes.writeFile path (renderTrace (Header (addUTCTime 60 (zeroTime header))) mended)
+          Bytes.writeFile path (renderTrace (Header (addUTCTime 60 (zeroTime header))) others)
           looks
         pure (field "run" hello :: Text)
       reading port plainly $ \connection -> do
         hello <- next connection
         field "zero" hello `shouldBe` ("2026-01-31T12:01:00Z" :: Text)
         field "run" hello `shouldNotBe` first
-        known connection (length mended) `shouldReturn` state mended
+        known connection (length others) `shouldReturn` state others
   it "is waited for while it is empty, or has half a header" $
     showing [renderTrace header mission] $ \port path looks _ -> do
       forM_ ["", Bytes.take 20 (renderTrace header [])] $ \content -> Bytes.writeFile path content >> looks

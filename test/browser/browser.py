@@ -75,8 +75,8 @@ class Browser:
         self.prepare()
 
     def other_tabs(self, count):
-        """What so many other tabs say at this moment, by themselves: whether each is hidden, its state, and how old the
-        value of the clock is that it shows (in milliseconds)."""
+        """What that number of other tabs say at this moment, by themselves: whether each is hidden, its state, and how
+        old the value of the clock is that it shows (in milliseconds)."""
         self.driver.execute_script("notes.told = []; between.postMessage('tell')")
         until(lambda: self.js("notes.told.length") == count, 5, "the answers of the other tabs")
         return self.js("notes.told")

@@ -273,7 +273,7 @@ def row_12():
 
 
 def row_8():
-    """Who may read it."""
+    """The access to it."""
     with Robot("work") as robot:
         own = f"127.0.0.1:{robot.port}"
         refusals = {
@@ -343,8 +343,8 @@ def row_9():
             for element in browser.driver.find_elements("css selector", selector)[:15]:
                 browser.driver.execute_script("arguments[0].click()", element)
         elements = browser.js("[...document.body.querySelectorAll('*')].map((e) => e.localName)")
-        allowed = set("a button canvas dd details dl dt form h1 h2 header input label li main ol option output p "
-                      "section select span summary table tbody td th thead tr ul".split())
+        allowed = set("a button canvas dd details div dl dt form h1 h2 header input label li main ol option output p "
+                      "section select span strong summary table tbody td th thead tr ul".split())
         claim(9, "elements that no name may make", sorted(set(elements) - allowed), "none", set(elements) <= allowed)
         claim(9, "what acted", browser.js("window.hit ?? null"), "None", browser.js("window.hit ?? null") is None)
         texts = browser.js("[document.title, document.body.innerText, ...[...document.querySelectorAll('input,"
