@@ -37,7 +37,7 @@ spec = do
   describe "The events that are kept" $ do
     prop "are within both limits, but for the newest chunk" . forAll sizes $ \(events, bytes, each) ->
       let limits = few {mostEvents = events, mostBytes = bytes}
-          history = foldl' (flip (add limits)) noHistory (inChunks each (interrupted 400))
+          history = foldl' (flip (add limits . map noted)) noHistory (inChunks each (interrupted 400))
           kept = fromMaybe [] (firstKept history)
           weight = sum (map (Bytes.length . encoded) kept)
        in counterexample (show (map firstNumber kept)) $
@@ -48,7 +48,7 @@ spec = do
             fmap (Bytes.intercalate (Bytes.singleton 44) . map encoded) (chunksFrom n (after each events))
               === Just (Bytes.intercalate (Bytes.singleton 44) (map line (drop n events)))
     it "are not given from where they are not kept any more, nor from within a chunk, nor from the future" $ do
-      let history = foldl' (flip (add few {mostEvents = 20})) noHistory (inChunks 10 (interrupted 100))
+      let history = foldl' (flip (add few {mostEvents = 20} . map noted)) noHistory (inChunks 10 (interrupted 100))
       map (fmap (map firstNumber) . (`chunksFrom` history)) [0, nextNumber history - 5, nextNumber history + 10]
         `shouldBe` [Nothing, Nothing, Nothing]
       chunksFrom (nextNumber history) history `shouldBe` Just []
@@ -65,7 +65,7 @@ spec = do
     _ -> 0
 
 after :: Int -> [Event] -> History
-after each = foldl' (flip (add defaultLimits)) noHistory . inChunks each
+after each = foldl' (flip (add defaultLimits . map noted)) noHistory . inChunks each
 
 inChunks :: Int -> [a] -> [[a]]
 inChunks each events = case splitAt each events of
@@ -77,4 +77,4 @@ lastOf n these = drop (length these - n) these
 
 -- As it is in a chunk.
 line :: Event -> Bytes.ByteString
-line = head . maybe [] (map encoded) . chunksFrom 0 . (\e -> add defaultLimits [e] noHistory)
+line = head . maybe [] (map encoded) . chunksFrom 0 . (\e -> add defaultLimits [noted e] noHistory)

@@ -4,7 +4,7 @@
 -- The live page over a socket of this machine.
 module Live.ServerSpec (spec) where
 
-import Control.Concurrent.Async (concurrently, mapConcurrently, withAsync)
+import Control.Concurrent.Async (concurrently, mapConcurrently, wait, withAsync)
 import Control.Concurrent.STM
 import Control.Exception (Handler (..), catches, evaluate, try)
 import Control.Monad (forM_, replicateM_, (>=>))
@@ -24,7 +24,7 @@ import System.Timeout (timeout)
 import Test.Hspec hiding (before)
 
 import Behavior.Live
-import Behavior.Live.Internal.History (defaultLimits, nextNumber)
+import Behavior.Live.Internal.History (Limits (..), defaultLimits, lostSoFar, nextNumber)
 import Behavior.Live.Internal.Protocol
 import Behavior.Live.Internal.Server hiding (pending)
 import Behavior.Time (now)
@@ -61,6 +61,18 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
     it "more than 4 KiB from a reader end the connection" $ serving Nothing $ \_ port -> do
       gave <- attached port (local port) (object ["version" .= one, "more" .= Text.replicate 5000 "x"])
       gave `shouldBe` Left "closed"
+
+  it "Events that are in hand when the run ends are counted as lost" $ do
+    let ours = Run "Ann" "run" (posixSecondsToUTCTime 0)
+    shown <- newShown defaultLimits {mostEvents = 10} ours (const (pure 0)) Nothing True
+    withAsync (receive shown (interrupted 2000)) $ \receiving -> do
+      let count = length (interrupted 2000)
+      some <- atomically (readTVar (inHand shown) >>= \n -> n <$ check (n > 0 && n < count))
+      finish shown
+      wait receiving
+      publishing shown
+      after <- readTVarIO (history shown)
+      (nextNumber after, lostSoFar after) `shouldBe` (count - some + 1, some)
 
   describe "A reader" $ do
     it "that comes late is given what runs and what was, and then what comes" $ serving Nothing $ \shown port -> do

@@ -6,9 +6,11 @@ any has failed. No row waits for a time to pass: each waits for what it looks fo
 """
 
 import collections
+import contextlib
 import json
 import os
 import signal
+import socket
 import statistics
 import subprocess
 import sys
@@ -194,6 +196,16 @@ def row_6():
               f"after {max(late) * 1000:.0f} ms")
         at_most(6, "the other reader's delay, 99th percentile", percentile(late, 0.99), 0.25)
         claim(6, "the other reader", browser.state(), "live", browser.state() == "live")
+    # Where nothing happens, the connection of one that never reads has place for all beats of a day.
+    with Robot("work") as robot, Browser() as browser:
+        robot.tell("tick 0")
+        browser.open(robot)
+        silent = [Silent(robot.port) for _ in range(20)]
+        fragments = Silent(robot.port, more=b"\x00\x80abcd" * 1000) # that are empty, and have no end
+        until(lambda: watched([*silent, fragments], connections(robot.port)), 30, "the end of all")
+        at_most(6, "where nothing happens: until they were cut", max(s.ended - s.begun for s in silent), 11)
+        at_most(6, "one that says fragments without end: until it was cut", fragments.ended - fragments.begun, 5)
+        claim(6, "the other reader", browser.state(), "live", browser.state() == "live")
 
 
 def row_11():
@@ -290,6 +302,15 @@ def row_8():
             browser.driver.get(f"http://127.0.0.1:{port}/")
             browser.comes("live", 5)
             claim(8, "another port, by a tunnel", browser.state(), "live", browser.state() == "live")
+    with Robot("work") as robot, contextlib.ExitStack() as stack:
+        files = os.listdir(f"/proc/{robot.process.pid}/fd")
+        for _ in range(200):
+            stack.enter_context(socket.create_connection(("127.0.0.1", robot.port)))
+        until(lambda: sum(is_there for is_there, _ in connections(robot.port).values()) <= 64, 5, "the end of others")
+        more = len(os.listdir(f"/proc/{robot.process.pid}/fd")) - len(files)
+        claim(8, "files that 200 connections take", more, "60 to 65", 60 <= more <= 65)
+        kept = [fd for fd in os.listdir(f"/proc/{robot.process.pid}/fd") if is_kept(robot.process.pid, fd)]
+        claim(8, "sockets that a program keeps that the mission starts", kept, "none", not kept)
     with Robot("secret", recorded=False) as robot, Browser() as browser:
         for token, wanted in (("another", "refused"), ("", "refused"), ("a%20secret", "live")):
             browser.driver.get("about:blank")
@@ -303,6 +324,16 @@ def row_8():
         except ConnectionRefusedError:
             refused = True
         claim(8, "beyond loopback without a token", robot.says.strip(), "no page", refused and "no page" in robot.says)
+
+
+def is_kept(process, fd):
+    """Whether that is a socket, and is not closed in programs that the process starts."""
+    with contextlib.suppress(OSError):
+        if os.readlink(f"/proc/{process}/fd/{fd}").startswith("socket:"):
+            with open(f"/proc/{process}/fdinfo/{fd}") as file:
+                flags = next(line.split()[1] for line in file if line.startswith("flags"))
+            return not int(flags, 8) & os.O_CLOEXEC
+    return False
 
 
 HOSTILE = [

@@ -92,10 +92,11 @@ def connections(port):
 
 
 class Silent:
-    """A reader that attaches, and never reads."""
+    """A reader that attaches, and never reads. (What it says after that are the bytes "more", again and again.)"""
 
-    def __init__(self, port):
+    def __init__(self, port, more=b""):
         self.port, self.waiting, self.stalled, self.ended = port, 0, None, None
+        self.more, self.begun = more, time.monotonic()
         self.socket = socket.socket()
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         self.socket.connect(("127.0.0.1", port))
@@ -111,6 +112,9 @@ class Silent:
     def watched(self, known):
         """Looks at its connection: whether it has ended. (Stalled: the robot's bytes are taken no more.)"""
         is_there, waiting = known.get(self.socket.getsockname()[1], (False, 0))
+        if self.more and self.ended is None:
+            with contextlib.suppress(OSError):
+                self.socket.sendall(self.more)
         if self.ended is None and not is_there:
             self.ended = time.monotonic()
         elif is_there and waiting != self.waiting:

@@ -19,10 +19,8 @@ module Behavior.Live
   , withLive
   ) where
 
-import Data.Time.Clock (NominalDiffTime, getCurrentTime)
-import Data.Time.Clock.POSIX (getPOSIXTime)
+import Data.Time.Clock (getCurrentTime)
 import GHC.Clock (getMonotonicTime)
-import Numeric (showHex)
 
 import Behavior (Behavior)
 import Behavior.Internal.Core.Seconds (Seconds (..))
@@ -94,10 +92,9 @@ withoutPage v =
 -- @since 0.1.0.0
 withLive :: LivePage -> (([Event] -> IO ()) -> IO a) -> IO a
 withLive page use = withListener page without $ \listener -> do
-  thisRun <- Run (robot page) <$> newName <*> getCurrentTime
+  thisRun <- Run (robot page) <$> newRunName <*> getCurrentTime
   begun <- Seconds <$> getMonotonicTime
   showing listener (newShown defaultLimits thisRun (const (subtract begun . Seconds <$> getMonotonicTime))) $ \shown ->
     use (receive shown . map (relativeTo begun))
  where
   without why = report ("no page: " ++ why) >> use (const (pure ()))
-  newName = (`showHex` "") . (round :: NominalDiffTime -> Integer) . (* 1000000) <$> getPOSIXTime

@@ -15,6 +15,7 @@ import Data.Bits (xor, (.|.))
 import Data.ByteString (ByteString)
 import qualified Data.ByteString as Bytes
 import qualified Data.ByteString.Char8 as Char8
+import Data.Char (isDigit)
 import Data.Foldable (foldl')
 import Data.Text (Text)
 import Data.Text.Encoding (encodeUtf8)
@@ -29,13 +30,16 @@ import Behavior.Internal.Loopback (isLoopback)
 -- ["allowed","allowed","refused"]
 refusedHost :: Maybe ByteString -> Maybe String
 refusedHost given = case given of
-  Just host | isLoopback (Char8.unpack (withoutPort host)) -> Nothing
+  Just host | Just name <- withoutPort host, isLoopback (Char8.unpack name) -> Nothing
   _ -> Just ("the host must be localhost, 127.0.0.1 or [::1] (use a tunnel: ssh -L), not " ++ maybe "none" show given)
 
-withoutPort :: ByteString -> ByteString
-withoutPort host
-  | "[" `Bytes.isPrefixOf` host = Char8.takeWhile (/= ']') host <> "]"
-  | otherwise = Char8.takeWhile (/= ':') host
+withoutPort :: ByteString -> Maybe ByteString
+withoutPort host = if Bytes.null port || isPort port then Just name else Nothing
+ where
+  (name, port)
+    | "[" `Bytes.isPrefixOf` host = Bytes.splitAt (1 + Bytes.length (Char8.takeWhile (/= ']') host)) host
+    | otherwise = Char8.break (== ':') host
+  isPort text = Bytes.length text > 1 && Char8.head text == ':' && Char8.all isDigit (Bytes.drop 1 text)
 
 -- | Why a websocket with these headers @Host@ and @Origin@ is refused, if it is: the page that opens it must come from
 -- here. A client that is no browser sends no @Origin@, and is refused unless it will show a token.

@@ -16,7 +16,6 @@ import qualified Data.ByteString as Bytes
 import qualified Data.ByteString.Char8 as Char8
 import qualified Data.ByteString.Lazy as Lazy
 import Data.Time.Clock (diffUTCTime, getCurrentTime)
-import Data.Time.Format.ISO8601 (iso8601Show)
 import System.IO
 import System.IO.Error (isDoesNotExistError)
 
@@ -63,7 +62,8 @@ opened path = withBinaryFile path ReadMode $ \file -> do
 showRun :: IO () -> LivePage -> FilePath -> Listener -> Begin -> IO (Maybe TraceError)
 showRun pause page path listener begin@(Begin (Header zero) line) = do
   seen <- newTVarIO (Seen 0 False)
-  showing listener (newShown kept (Run (robot page) (iso8601Show zero) zero) (time seen)) $ \shown ->
+  thisRun <- (\name -> Run (robot page) name zero) <$> newRunName
+  showing listener (newShown kept thisRun (time seen)) $ \shown ->
     let go isKnown at = look path begin at >>= \case
           NoMore -> pause >> go True at
           More events after -> do
@@ -73,7 +73,7 @@ showRun pause page path listener begin@(Begin (Header zero) line) = do
             go isKnown after
           Another -> pure Nothing
           Damaged problem -> pure (Just problem)
-    in go False (Position (toInteger (Bytes.length line)) 0)
+    in go False (Position (toInteger (Bytes.length line)) 0 line)
  where
   -- A page keeps as many.
   kept = defaultLimits {mostEnded = 20000, mostReactions = 2000}
@@ -86,8 +86,8 @@ showRun pause page path listener begin@(Begin (Header zero) line) = do
 -- | The time of the last event; and whether the file has grown since it was shown.
 data Seen = Seen !Seconds !Bool
 
--- | How many bytes were read, and events.
-data Position = Position !Integer !Int
+-- | How many bytes were read, and events; and the last of the bytes.
+data Position = Position !Integer !Int !Bytes.ByteString
 
 data Look
   = -- | There is no further line.
@@ -99,10 +99,13 @@ data Look
 
 -- | Reads the next lines, as far as they are complete. (A file that is not there is being replaced.)
 look :: FilePath -> Begin -> Position -> IO Look
-look path (Begin _ header) (Position from count) = absent NoMore . withBinaryFile path ReadMode $ \file -> do
+look path (Begin _ header) (Position from count lastRead) = absent NoMore . withBinaryFile path ReadMode $ \file -> do
   begins <- Bytes.hGet file (Bytes.length header)
   size <- hFileSize file
-  if begins /= header || size < from then pure Another else found <$> linesFrom file 1048576
+  hSeek file AbsoluteSeek (from - toInteger (Bytes.length lastRead))
+  again <- Bytes.hGet file (Bytes.length lastRead)
+  -- (Another run may have the same zero: each simulated one has.)
+  if begins /= header || size < from || again /= lastRead then pure Another else found <$> linesFrom file 1048576
  where
   found complete
     | Bytes.null complete = NoMore
@@ -110,7 +113,8 @@ look path (Begin _ header) (Position from count) = absent NoMore . withBinaryFil
         Left (DamagedLine n why) -> Damaged (DamagedLine (n + count) why)
         Left problem -> Damaged problem
         Right (_, events, _) ->
-          More events (Position (from + toInteger (Bytes.length complete)) (count + length events))
+          More events (Position (from + toInteger (Bytes.length complete)) (count + length events) (lastOf complete))
+  lastOf bytes = Bytes.copy (Bytes.drop (Bytes.length bytes - 4096) bytes)
   linesFrom file most = do
     hSeek file AbsoluteSeek from
     bytes <- Bytes.hGet file most

@@ -8,6 +8,8 @@
 module Behavior.Live.Internal.History
   ( History
   , noHistory
+  , Noted
+  , noted
   , add
   , Limits (..)
   , defaultLimits
@@ -26,6 +28,7 @@ import qualified Data.ByteString.Lazy as Bytes
 import Data.Foldable (foldl', toList)
 import Data.IntMap.Strict (IntMap)
 import qualified Data.IntMap.Strict as IntMap
+import Data.IntSet (IntSet)
 import qualified Data.IntSet as IntSet
 import Data.Sequence (Seq (..), (|>))
 import qualified Data.Sequence as Seq
@@ -41,8 +44,10 @@ data History = History
   , bytesKept :: !Int
   , nextNumber :: !Int
   -- ^ The number of the next event.
-  , running :: !(IntMap Span)
-  -- ^ The spans that have not ended, by their numbers.
+  , running :: !(IntMap (Parent, Bytes.ByteString))
+  -- ^ The beginnings of the spans that have not ended, by their numbers.
+  , inside :: !(IntMap IntSet)
+  -- ^ Those of them that run in a span, by its number.
   , endedLast :: !(Seq Bytes.ByteString)
   , reactedLast :: !(Seq Bytes.ByteString)
   , lostSoFar :: !Int
@@ -72,23 +77,44 @@ defaultLimits = Limits {mostEvents = 20000, mostBytes = 16777216, mostEnded = 20
 
 -- | Before the first event.
 noHistory :: History
-noHistory = History Seq.empty 0 0 0 IntMap.empty Seq.empty Seq.empty 0
+noHistory = History Seq.empty 0 0 0 IntMap.empty IntMap.empty Seq.empty Seq.empty 0
+
+-- | An event as it is sent, and what it changes for someone who comes late.
+data Noted = Noted !About !Bytes.ByteString
+
+data About
+  = Begins !Int !Parent
+  | Ends !Int
+  | Reacts
+  | Loses !Int
+
+-- | The event, encoded. (Evaluated, it keeps nothing of the event: a text takes a byte for each character there.)
+noted :: Event -> Noted
+noted event = Noted about (compact (Bytes.init (toLazyByteString (encodeEvent event))))
+ where
+  about = case event of
+    Began s -> Begins (spanNumber s) (spanParent s)
+    Ended s _ _ -> Ends (spanNumber s)
+    Reacted _ -> Reacts
+    Lost n -> Loses n
+
+compact :: Bytes.ByteString -> Bytes.ByteString
+compact = Bytes.fromStrict . Bytes.toStrict
 
 -- | With one more chunk, of these events. (The newest chunk is kept, however large it is.)
-add :: Limits -> [Event] -> History -> History
+add :: Limits -> [Noted] -> History -> History
 add _ [] history = history
 add limits events history =
-  forgetting limits $ (foldl' (noting limits) history (zip events each))
+  forgetting limits $ (foldl' (noting limits) history events)
     { chunks = chunks history |> chunk
     , eventsKept = eventsKept history + length events
     , bytesKept = bytesKept history + size chunk
     , nextNumber = afterLast chunk
     }
  where
-  each = map (Bytes.init . toLazyByteString . encodeEvent) events
-  chunk = Chunk from (from + length events) $! compact (Bytes.intercalate (Bytes.singleton 44) each)
+  chunk = Chunk from (from + length events) $! compact (Bytes.intercalate (Bytes.singleton 44) (map line events))
   from = nextNumber history
-  compact = Bytes.fromStrict . Bytes.toStrict
+  line (Noted _ bytes) = bytes
 
 size :: Chunk -> Int
 size = fromIntegral . Bytes.length . encoded
@@ -105,29 +131,31 @@ forgetting limits history = case chunks history of
   _ -> history
 
 -- What one event changes for someone who comes late.
-noting :: Limits -> History -> (Event, Bytes.ByteString) -> History
-noting limits history (event, line) = case event of
-  Began s -> history {running = IntMap.insert (spanNumber s) s (running history)}
-  Ended s _ _ -> history {running = without s, endedLast = keep (mostEnded limits) (endedLast history)}
-  Reacted _ -> history {reactedLast = keep (mostReactions limits) (reactedLast history)}
-  Lost n -> history {lostSoFar = lostSoFar history + n}
+noting :: Limits -> History -> Noted -> History
+noting limits history (Noted about line) = case about of
+  Begins n parent -> beginning n parent history {running = IntMap.insert n (parent, line) (running history)}
+  Ends n -> (ending n history) {endedLast = keep (mostEnded limits) (endedLast history)}
+  Reacts -> history {reactedLast = keep (mostReactions limits) (reactedLast history)}
+  Loses n -> history {lostSoFar = lostSoFar history + n}
  where
   keep most kept = let more = kept |> line in if Seq.length more > most then Seq.drop 1 more else more
-  -- After a loss there may be spans in it whose end was lost. They have greater numbers.
-  without s
-    | lostSoFar history == 0 = IntMap.delete (spanNumber s) (running history)
-    | otherwise =
-        let (earlier, later) = IntMap.split (spanNumber s) (running history)
-         in IntMap.union earlier (outside (spanNumber s) later)
+  beginning n parent h = case parent of
+    Inside p -> h {inside = IntMap.insertWith IntSet.union p (IntSet.singleton n) (inside h)}
+    _ -> h
 
--- Without those that are, by their parents, inside of the span with this number.
-outside :: Int -> IntMap Span -> IntMap Span
-outside number later = IntMap.withoutKeys later inside
+-- The span with this number has ended. After a loss there may be spans in it whose end was lost: these have, too.
+ending :: Int -> History -> History
+ending n history = foldl' (flip ending) alone (if lostSoFar history == 0 then [] else maybe [] IntSet.toList within)
  where
-  inside = foldl' including (IntSet.singleton number) (IntMap.elems later)
-  including found s = case spanParent s of
-    Inside p | p `IntSet.member` found -> IntSet.insert (spanNumber s) found
-    _ -> found
+  within = IntMap.lookup n (inside history)
+  alone =
+    history
+      { running = IntMap.delete n (running history)
+      , inside = IntMap.delete n $ case IntMap.lookup n (running history) of
+          Just (Inside p, _) -> IntMap.update (nonEmpty . IntSet.delete n) p (inside history)
+          _ -> inside history
+      }
+  nonEmpty these = if IntSet.null these then Nothing else Just these
 
 -- | The chunks from the event with this number on; nothing if not all of them are kept any more, or it is no number at
 -- which a chunk begins.
@@ -151,7 +179,7 @@ data Snapshot = Snapshot
 snapshot :: History -> Snapshot
 snapshot history =
   Snapshot
-    { runningNow = map (Bytes.init . toLazyByteString . encodeEvent . Began) (IntMap.elems (running history))
+    { runningNow = map snd (IntMap.elems (running history))
     , lastEnded = toList (endedLast history)
     , lastReacted = toList (reactedLast history)
     }

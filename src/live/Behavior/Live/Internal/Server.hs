@@ -18,17 +18,20 @@ module Behavior.Live.Internal.Server
 import Control.Concurrent.Async (race_)
 import Control.Concurrent.STM
 import Control.Exception (bracket_, evaluate, handle, throwIO)
-import Control.Monad (forever, void, when)
+import Control.Monad (forever, unless, void, when, (>=>))
+import Data.Bifunctor (bimap)
+import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Lazy as Bytes
 import qualified Data.ByteString.Lazy.Char8 as Char8
 import Data.Foldable (traverse_)
+import Data.IORef
 import Data.Maybe (isJust)
 import Data.Text (Text)
 import qualified Data.Text as Text
 import GHC.Clock (getMonotonicTime)
 import Network.HTTP.Types
 import Network.Wai
-import Network.Wai.Handler.WebSockets (isWebSocketsReq, websocketsApp)
+import Network.Wai.Handler.WebSockets (getRequestHead, isWebSocketsReq, runWebSockets)
 import Network.WebSockets (ConnectionOptions (..), SizeLimit (..), defaultConnectionOptions)
 import qualified Network.WebSockets as Websockets
 import System.Timeout (timeout)
@@ -40,7 +43,7 @@ import Behavior.Live.Internal.Access
 import Behavior.Live.Internal.History
 import Behavior.Live.Internal.Page
 import Behavior.Live.Internal.Protocol
-import Behavior.Trace (Event)
+import Behavior.Trace (Event (Lost))
 
 -- | What is shown, and to how many.
 data Shown = Shown
@@ -51,8 +54,10 @@ data Shown = Shown
   , onlyHere :: Bool
   -- ^ Whether only this machine reaches it.
   , limits :: Limits
-  , pending :: TVar (Int, [Event])
+  , pending :: TVar (Int, [Noted])
   -- ^ Those that are in no chunk yet, the newest first; and how many.
+  , inHand :: TVar Int
+  -- ^ How many have come, but are not there yet.
   , history :: TVar History
   , isOver :: TVar Bool
   -- ^ Whether no more events come.
@@ -66,6 +71,7 @@ newShown :: Limits -> Run -> (History -> IO Seconds) -> Maybe Text -> Bool -> IO
 newShown most this time secret here =
   Shown this time secret here most
     <$> newTVarIO (0, [])
+    <*> newTVarIO 0
     <*> newTVarIO noHistory
     <*> newTVarIO False
     <*> newTVarIO False
@@ -76,11 +82,23 @@ newShown most this time secret here =
 -- more than its first 1,000 characters.
 receive :: Shown -> [Event] -> IO ()
 receive shown events = do
-  short <- traverse (traverseTexts shortened) events
-  atomically $ do
+  atomically (writeTVar (inHand shown) (length events))
+  go events
+ where
+  -- (A few at a time: as texts they take many times the memory.)
+  go [] = pure ()
+  go rest = do
+    let (some, others) = splitAt 500 rest
+    these <- traverse (traverseTexts shortened >=> evaluate . noted) some
+    goesOn <- atomically $ do
+      ends <- readTVar (isOver shown)
+      if ends then pure False else True <$ append (length these) (reverse these)
+    when goesOn (go others)
+  append n these = do
     (count, before) <- readTVar (pending shown)
     check (count < mostEvents (limits shown))
-    writeTVar (pending shown) (count + length short, reverse short ++ before)
+    writeTVar (pending shown) (count + n, these ++ before)
+    modifyTVar' (inHand shown) (subtract n)
 
 -- (Evaluated to its end, so that nothing longer is kept.)
 shortened :: String -> IO String
@@ -105,9 +123,12 @@ publishing shown = do
     then atomically (writeTVar (isComplete shown) True)
     else timeout 50000 (atomically (readTVar (isOver shown) >>= check)) >> publishing shown
 
--- | Says that the run is over.
+-- | Says that the run is over. Events that are in hand are lost, and counted.
 finish :: Shown -> IO ()
-finish shown = atomically (writeTVar (isOver shown) True)
+finish shown = atomically $ do
+  writeTVar (isOver shown) True
+  n <- readTVar (inHand shown)
+  when (n > 0) $ modifyTVar' (pending shown) (bimap (+ 1) (noted (Lost n) :))
 
 -- | Waits until there is no reader any more.
 allHaveRead :: Shown -> IO ()
@@ -128,15 +149,37 @@ application shown request respond = case forbidden of
     | isWebSocketsReq request = refusedOrigin (isJust (token shown)) (header "Host") (header "Origin")
     | otherwise = Nothing
   reader this
-    | pathInfo this == ["live"] = websocketsApp options (accepting shown) this
+    | pathInfo this == ["live"] = Just (responseRaw (connected this) (refused status404 "this is for websockets"))
     | otherwise = Nothing
+  connected this source sink = do
+    said <- newIORef 0
+    answered <- newIORef True
+    let options = readerOptions {connectionOnPong = writeIORef answered True}
+    runWebSockets options (getRequestHead this) (accepting shown answered) (bounded said source) (inTime sink)
   file (kind, content) = responseLBS status200 ((hContentType, kind) : always) (Bytes.fromStrict content)
   refused status why =
     responseLBS status ((hContentType, "text/plain; charset=utf-8") : always) (Char8.pack (why ++ "\n"))
-  options = defaultConnectionOptions
-    { connectionFramePayloadSizeLimit = SizeLimit 4096
-    , connectionMessageDataSizeLimit = SizeLimit 4096
-    }
+
+readerOptions :: ConnectionOptions
+readerOptions = defaultConnectionOptions
+  { connectionFramePayloadSizeLimit = SizeLimit 4096
+  , connectionMessageDataSizeLimit = SizeLimit 4096
+  }
+
+-- The bytes that a reader says: at most 256 KiB in all, which is enough to answer pings for days.
+bounded :: IORef Int -> IO Strict.ByteString -> IO Strict.ByteString
+bounded said source = do
+  bytes <- source
+  modifyIORef' said (+ Strict.length bytes)
+  n <- readIORef said
+  if n > 262144 then throwIO Websockets.ConnectionClosed else pure bytes
+
+-- What is sent: a reader that takes nothing for five seconds is cut.
+inTime :: (Strict.ByteString -> IO ()) -> Strict.ByteString -> IO ()
+inTime sink bytes = case Strict.splitAt 65536 bytes of
+  (some, rest) -> do
+    timeout 5000000 (sink some) >>= maybe (throwIO Websockets.ConnectionClosed) pure
+    unless (Strict.null rest) (inTime sink rest)
 
 -- The page loads nothing from elsewhere, and is in no frame of another one.
 always :: ResponseHeaders
@@ -157,21 +200,26 @@ mostReaders = 32
 
 -- One that does not say in time what it wants, says anything more, or does not read, is cut. (That it is gone is no
 -- error.)
-accepting :: Shown -> Websockets.ServerApp
-accepting shown waiting = handle gone $ do
+accepting :: Shown -> IORef Bool -> Websockets.ServerApp
+accepting shown answered waiting = handle gone $ do
   connection <- Websockets.acceptRequest waiting
-  let say bytes = timeout 5000000 (Websockets.sendTextData connection bytes) >>= maybe tooSlow pure
+  let say = Websockets.sendTextData connection
       refuse why = say (refusal why) >> ending connection
+      ping = do
+        isThere <- readIORef answered
+        unless isThere (throwIO Websockets.ConnectionClosed)
+        writeIORef answered False
+        Websockets.sendPing connection ("" :: Text)
   bracket_ (counted (+ 1)) (counted (subtract 1)) $ do
     many <- readTVarIO (readers shown)
     first <- timeout 5000000 (Websockets.receiveData connection)
     case if many > mostReaders then Left tooMany else maybe (Left "nothing was said for 5 s") attach first of
       Left why -> refuse why
-      Right wanted -> race_ (Websockets.receiveDataMessage connection) (telling shown say wanted >> ending connection)
+      Right wanted ->
+        race_ (Websockets.receiveDataMessage connection) (telling shown say ping wanted >> ending connection)
  where
   gone :: Websockets.ConnectionException -> IO ()
   gone _ = pure ()
-  tooSlow = throwIO Websockets.ConnectionClosed
   counted f = atomically (modifyTVar' (readers shown) f)
   tooMany = "there are " ++ show mostReaders ++ " readers, which is the most"
   attach bytes
@@ -189,22 +237,23 @@ accepting shown waiting = handle gone $ do
     Websockets.sendClose connection ("" :: Text)
     void (timeout 1000000 (forever (Websockets.receiveDataMessage connection)))
 
--- Sends a reader all that comes.
-telling :: Shown -> (Bytes.ByteString -> IO ()) -> Attach -> IO ()
-telling shown say wanted = do
+-- Sends a reader all that comes; with each sixteenth beat, some five seconds, a ping.
+telling :: Shown -> (Bytes.ByteString -> IO ()) -> IO () -> Attach -> IO ()
+telling shown say ping wanted = do
   say (hello (run shown))
   begun <- readTVarIO (history shown)
   cursor <- case knownUntil wanted of
     Just (known, n) | known == Text.pack (runName (run shown)), Just _ <- chunksFrom n begun -> pure n
     _ -> whole begun
-  follow (-1) cursor
+  follow (0 :: Int) (-1) cursor
  where
-  -- The time of the last beat, and the number of the event to tell next.
-  follow before cursor = do
+  -- The number of beats, the time of the last one, and the number of the event to tell next.
+  follow beatsSaid before cursor = do
     t <- getMonotonicTime
     let beats = t - before >= beatEvery
         latestBeat = if beats then t else before
     when beats $ atTime beat =<< readTVarIO (history shown)
+    when (beats && beatsSaid `mod` 16 == 0) ping
     _ <- timeout (ceiling (1000000 * (latestBeat + beatEvery - t))) . atomically $ do
       next <- nextNumber <$> readTVar (history shown)
       complete <- readTVar (isComplete shown)
@@ -213,7 +262,7 @@ telling shown say wanted = do
     cursor' <- case chunksFrom cursor after of
       Just new -> nextNumber after <$ traverse_ (say . eventsMessage) new
       Nothing -> whole after
-    if complete then atTime over after else follow latestBeat cursor'
+    if complete then atTime over after else follow (if beats then beatsSaid + 1 else beatsSaid) latestBeat cursor'
   whole current = nextNumber current <$ atTime snapshotMessage current
   atTime message current = clock shown current >>= \t -> say (message t current)
   beatEvery = 0.3

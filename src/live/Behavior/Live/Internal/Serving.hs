@@ -12,10 +12,12 @@ module Behavior.Live.Internal.Serving
     -- * Serving
   , Listener
   , withListener
+  , newRunName
   , showing
   ) where
 
 import Control.Concurrent.Async (wait, withAsync)
+import Control.Concurrent.STM
 import Control.Exception (IOException, bracket, displayException, finally, try)
 import Control.Monad (mfilter, void)
 import qualified Data.ByteString.Char8 as Char8
@@ -23,9 +25,19 @@ import Data.Maybe (isNothing)
 import Data.Text (Text)
 import qualified Data.Text as Text
 import Data.Text.Encoding (encodeUtf8)
+import Data.Time.Clock (NominalDiffTime)
+import Data.Time.Clock.POSIX (getPOSIXTime)
 import Network.HTTP.Types (urlEncode)
 import Network.Socket
-import Network.Wai.Handler.Warp (defaultSettings, runSettingsSocket, setOnException)
+import Network.Wai.Handler.Warp
+  ( defaultSettings
+  , runSettingsSocket
+  , setOnClose
+  , setOnException
+  , setOnOpen
+  , setTimeout
+  )
+import Numeric (showHex)
 import System.IO (hPutStrLn, stderr)
 import System.Timeout (timeout)
 
@@ -80,16 +92,27 @@ withListener page without use
   host = if ':' `elem` bare (pageHost page) then "[" ++ bare (pageHost page) ++ "]" else pageHost page
   inAddress = Char8.unpack . urlEncode True . encodeUtf8 . Text.pack
 
+-- | A name that no other run has, of whichever program at this address.
+newRunName :: IO String
+newRunName = (`showHex` "") . (round :: NominalDiffTime -> Integer) . (* 1000000) <$> getPOSIXTime
+
 -- | Serves one run, which is made for the token and whether only this machine reaches it, while the action runs. After
 -- the action, readers have a second to read the end, however it ends.
 showing :: Listener -> (Maybe Text -> Bool -> IO Shown) -> (Shown -> IO a) -> IO a
 showing (Listener listener secret here) new use = do
   shown <- new secret here
+  connections <- newTVarIO (0 :: Int)
+  let isOpen n _ = atomically $ stateTVar connections (\m -> (m < mostConnections, m + n))
+      settings = setOnOpen (isOpen 1) . setOnClose (void . isOpen (-1)) . setTimeout 10 $ quietly defaultSettings
   withAsync (publishing shown) $ \publisher ->
-    withAsync (runSettingsSocket (quietly defaultSettings) listener (application shown)) $ \_ ->
-      use shown `finally` (finish shown >> wait publisher >> timeout 1000000 (allHaveRead shown))
+    withAsync (runSettingsSocket settings listener (application shown)) $ \_ ->
+      use shown `finally` (finish shown >> timeout 1000000 (wait publisher >> allHaveRead shown))
  where
   quietly = setOnException (\_ _ -> pure ())
+
+-- | The greatest number of connections at a time, whatever they are for: the mission needs file descriptors, too.
+mostConnections :: Int
+mostConnections = 64
 
 -- An address of IPv6 may be in brackets.
 bare :: String -> String
@@ -108,6 +131,8 @@ listening page = go (if pagePort page == 0 then [0] else takeWhile (<= 65535) (t
     let there = head found
     new <- socket (addrFamily there) Stream defaultProtocol
     setSocketOption new ReuseAddr 1
+    -- (A program that the mission starts, and that outlasts it, would keep the port.)
+    withFdSocket new setCloseOnExecIfNeeded
     r <- try (bind new (addrAddress there) >> listen new 64)
     either (\e -> close new >> ioError (e :: IOException)) (const (pure new)) r
   hints = defaultHints {addrSocketType = Stream}
