@@ -255,6 +255,8 @@ function showState(time) {
   const told = [];
   if (lost > 0) told.push(`the trace has lost ${lost} events`);
   if (missed > 0) told.push(`gap: of ${missed} events only a summary came`);
+  const open = isOver ? [...spans.values()].filter((span) => !span.end).length : 0;
+  if (open > 0) told.push(`no end has come of ${open} of what ran`);
   setText($("told"), told.join("; "));
   $("pause").setAttribute("aria-pressed", String(pausedAt !== null));
   setText($("pause"), pausedAt === null ? "Pause" : "Go on");

@@ -26,7 +26,8 @@ import Test.Hspec hiding (before)
 import Behavior.Live
 import Behavior.Live.Internal.History (Limits (..), defaultLimits, lostSoFar, nextNumber)
 import Behavior.Live.Internal.Protocol
-import Behavior.Live.Internal.Server hiding (pending)
+import Behavior.Live.Internal.Server (application)
+import Behavior.Live.Internal.Shown hiding (pending)
 import Behavior.Time (now)
 import Behavior.Trace
 import Live.Reader
@@ -39,7 +40,7 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
       forM_ ["localhost", "127.0.0.1:" <> Char8.pack (show port), "[::1]:9999", "LOCALHOST:1"] $
         page port >=> (`shouldSatisfy` ("HTTP/1.1 200" `isPrefixOf`))
     it "under another name it is refused" $ serving Nothing $ \_ port ->
-      forM_ ["evil.example", "127.0.0.1.evil.example:8420", "localhost.evil.example", ""] $
+      forM_ ["evil.example", "127.0.0.1.evil.example:8420", "localhost.evil.example", "", "localhost:80@evil.example"] $
         page port >=> (`shouldSatisfy` ("HTTP/1.1 403" `isPrefixOf`))
     it "it loads nothing from elsewhere" $ serving Nothing $ \_ port ->
       page port "localhost" >>= (`shouldSatisfy` ("Content-Security-Policy: default-src 'none'" `isInfixOf`))
@@ -63,16 +64,15 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
       gave `shouldBe` Left "closed"
 
   it "Events that are in hand when the run ends are counted as lost" $ do
-    let ours = Run "Ann" "run" (posixSecondsToUTCTime 0)
     shown <- newShown defaultLimits {mostEvents = 10} ours (const (pure 0)) Nothing True
-    withAsync (receive shown (interrupted 2000)) $ \receiving -> do
-      let count = length (interrupted 2000)
-      some <- atomically (readTVar (inHand shown) >>= \n -> n <$ check (n > 0 && n < count))
+    let many = interrupted 2000
+    withAsync (receive shown many) $ \receiving -> do
+      late <- atomically (readTVar (inHand shown) >>= \n -> n <$ check (n > 0 && n < length many))
       finish shown
       wait receiving
       publishing shown
-      after <- readTVarIO (history shown)
-      (nextNumber after, lostSoFar after) `shouldBe` (count - some + 1, some)
+      made <- readTVarIO (history shown)
+      (nextNumber made, lostSoFar made) `shouldBe` (length many - late + 1, late)
 
   describe "A reader" $ do
     it "that comes late is given what runs and what was, and then what comes" $ serving Nothing $ \shown port -> do
@@ -165,10 +165,13 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
  where
   one = 1 :: Int
 
+ours :: Run
+ours = Run "Ann" "run" (posixSecondsToUTCTime 0)
+
 -- A page with what is needed for it, and its port.
 serving :: Maybe Text -> (Shown -> Int -> IO a) -> IO a
 serving secret use = do
-  shown <- newShown defaultLimits (Run "Ann" "run" (posixSecondsToUTCTime 0)) (const (pure 0)) secret True
+  shown <- newShown defaultLimits ours (const (pure 0)) secret True
   withAsync (publishing shown) $ \_ -> testWithApplication (pure (application shown)) (use shown)
 
 -- Returns when they are in chunks.

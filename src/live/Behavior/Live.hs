@@ -26,8 +26,8 @@ import Behavior (Behavior)
 import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Live.Internal.History (defaultLimits)
 import Behavior.Live.Internal.Protocol (Run (..))
-import Behavior.Live.Internal.Server
 import Behavior.Live.Internal.Serving
+import Behavior.Live.Internal.Shown
 import Behavior.Trace (Event, Sink (Batches), withTrace)
 import Behavior.Trace.File (relativeTo)
 import qualified Behavior.Trace.Viewing as Viewer

@@ -22,8 +22,8 @@ import System.IO.Error (isDoesNotExistError)
 import Behavior.Internal.Core.Seconds (Seconds (..))
 import Behavior.Live.Internal.History
 import Behavior.Live.Internal.Protocol (Run (..))
-import Behavior.Live.Internal.Server
 import Behavior.Live.Internal.Serving
+import Behavior.Live.Internal.Shown
 import Behavior.Trace (Event)
 import Behavior.Trace.Describe (inert)
 import Behavior.Trace.File

@@ -42,7 +42,8 @@ import System.IO (hPutStrLn, stderr)
 import System.Timeout (timeout)
 
 import Behavior.Internal.Loopback (isLoopback)
-import Behavior.Live.Internal.Server
+import Behavior.Live.Internal.Server (application)
+import Behavior.Live.Internal.Shown
 
 -- | Where the page is, and what it says.
 --
