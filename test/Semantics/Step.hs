@@ -295,6 +295,8 @@ receive t = \case
   Taking awaited _
     | awaited, Just (At 0) <- Map.lookup messages (levels t) -> stopped
     | otherwise -> []
+  -- (The handler runs unmasked: so a request that came while it masked itself is received at its end.)
+  Handling (Over (Succeeded _)) -> [(Silent, Handling (Over (Stopped Nothing)))]
   Handling (Over _) -> []
   Handling r -> fmap Handling <$> receive t r
   Serving handler r -> maybe stopped (fmap (fmap (serving handler)) . receive t) r

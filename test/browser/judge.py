@@ -482,6 +482,33 @@ def press(browser, keys):
     ActionChains(browser.driver).send_keys(keys).perform()
 
 
+def pictures():
+    """Pictures of three missions, in two sizes, light and dark: for someone who has not seen the page to look at."""
+    missions = {"door-battery": ["door-battery", "--program", "names"], "patrol": ["robots", "patrol"],
+                "fleet": ["robots", "fleet"]}
+    os.makedirs(FOLDER + "/pictures", exist_ok=True)
+    for name, (program, *arguments) in missions.items():
+        file = f"{FOLDER}/{name}.jsonl"
+        subprocess.run([f"{FOLDER}/{program}", *arguments, "--simulate", "--trace", file], check=True,
+                       stdout=subprocess.DEVNULL)
+        tool = subprocess.Popen([FOLDER + "/behavior-trace", file, "--live"], stderr=subprocess.PIPE, text=True)
+        address = "http" + tool.stderr.readline().split("http")[1].strip()
+        for width, dark in ((1280, False), (1280, True), (360, False), (360, True)):
+            with Browser(width=width, dark=dark) as browser:
+                browser.driver.get(address)
+                browser.comes("live", 5)
+                until(lambda: browser.texts("#interruptions li"), 5, "an interruption")
+                browser.driver.execute_script("""
+                  document.getElementById("time").value = 620;
+                  document.getElementById("time").dispatchEvent(new Event("input"));""")
+                until(lambda: browser.js("frame === null"), 5, "the frame")
+                browser.driver.save_screenshot(f"{FOLDER}/pictures/{name}-{width}-{'dark' if dark else 'light'}.png")
+        tool.kill()
+        tool.communicate()
+    kept = os.listdir(FOLDER + "/pictures")
+    claim(13, "pictures of three missions, in dist-newstyle/browser/pictures", len(kept), "12", len(kept) == 12)
+
+
 def row_13():
     """The picture in docs/seeing-a-robot.md is what the page shows of the mission that README.md draws."""
     file, made, picture = FOLDER + "/door-battery.jsonl", FOLDER + "/live-page.png", "docs/pictures/live-page.png"
@@ -510,6 +537,7 @@ def row_13():
         other = differ.histogram()[255] / (sizes[0][0] * sizes[0][1])
     claim(13, f"pixels of {picture} that are others in {made.removeprefix(os.getcwd() + '/')}", f"{other:.2%}",
           "at most 1%; else look at it, and copy it there", other <= 0.01)
+    pictures()
 
 
 for row in map(int, sys.argv[1:]):
