@@ -7,7 +7,7 @@ const mostReactions = 2000;
 const mostRows = 300; // in a list
 const mostLanes = 60; // of the timeline
 const mostSeconds = 60; // of the timeline
-const mostSilence = 900; // milliseconds
+const mostSilence = 700; // milliseconds: of the next two beats none has come
 const $ = (id) => document.getElementById(id);
 
 // --- What is known ----------------------------------------------------------
