@@ -92,9 +92,10 @@ def connections(port):
 
 
 class Silent:
-    """A reader that attaches, and never reads. (What it says after that are the bytes "more", again and again.)"""
+    """A reader that attaches, and never reads. (What it says after that are these bytes: the first ones once, and the
+    others again and again.)"""
 
-    def __init__(self, port, more=b""):
+    def __init__(self, port, once=b"", more=b""):
         self.port, self.waiting, self.stalled, self.ended = port, 0, None, None
         self.more, self.begun = more, time.monotonic()
         self.socket = socket.socket()
@@ -107,7 +108,7 @@ class Silent:
         attach = b'{"version":1}'
         mask = os.urandom(4)
         self.socket.sendall(struct.pack("BB", 0x81, 0x80 | len(attach)) + mask
-                            + bytes(b ^ mask[i % 4] for i, b in enumerate(attach)))
+                            + bytes(b ^ mask[i % 4] for i, b in enumerate(attach)) + once)
 
     def watched(self, known):
         """Looks at its connection: whether it has ended. (Stalled: the robot's bytes are taken no more.)"""
