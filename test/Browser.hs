@@ -45,7 +45,7 @@ main = do
   onPage port = served loopback {robot = "Ann", pagePort = read port}
   served page file = runBehavior . viewing defaultViewing {livePage = Just page, traceFile = file}
 
--- | Runs the behaviour until a line comes that it is not given, or the input ends.
+-- | Runs the behaviour until a line comes that is no command, or the input ends. (A command gives what it does.)
 commanded :: (String -> Maybe (Behavior ())) -> Behavior () -> Behavior ()
 commanded command behavior = firstOf [behavior, obeying]
  where

@@ -8,6 +8,7 @@ const mostRows = 300; // in a list
 const mostLanes = 60; // of the timeline
 const mostSeconds = 60; // of the timeline
 const mostSilence = 700; // milliseconds: of the next two beats none has come
+const mostPatience = 10000; // and then another connection is tried
 const $ = (id) => document.getElementById(id);
 
 // --- What is known ----------------------------------------------------------
@@ -21,7 +22,7 @@ let next = null; // the number of the event that comes next, when one is known
 let lost = 0; // by the robot
 let missed = 0; // events of which only the summary came
 let robotTime = 0; // of the last message that has one
-let silence = null; // the timer of what comes when no message does
+let silence = null; // the timer of what happens when no message comes
 let since = null; // when it was disconnected
 let isOver = false;
 let refusal = null;
@@ -85,6 +86,23 @@ function forgetOldest() {
 
 function connect() {
   const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+  // A robot that is stopped closes nothing: it only falls silent. One whose machine has vanished remains so.
+  const waitFor = (time, then) => {
+    clearTimeout(silence);
+    silence = setTimeout(then, time);
+  };
+  const giveUp = () => {
+    socket.onmessage = socket.onclose = null;
+    socket.close();
+    connect();
+  };
+  const isSilent = () => {
+    if (refusal) return;
+    if (!isOver) since ??= new Date(Date.now() - mostSilence);
+    show();
+    waitFor(mostPatience, giveUp);
+  };
+  waitFor(mostPatience, giveUp);
   socket.onopen = () => {
     const attach = { version: 1 };
     if (location.hash.length > 1) attach.token = token(location.hash.slice(1));
@@ -92,8 +110,7 @@ function connect() {
     socket.send(JSON.stringify(attach));
   };
   socket.onmessage = ({ data }) => {
-    clearTimeout(silence);
-    silence = setTimeout(isSilent, mostSilence);
+    waitFor(mostSilence, isSilent);
     since = null;
     receive(JSON.parse(data));
     show();
@@ -101,6 +118,7 @@ function connect() {
   socket.onclose = () => {
     if (!isOver && !refusal) since ??= new Date();
     show();
+    clearTimeout(silence);
     if (!refusal) setTimeout(connect, 1000);
   };
 }
@@ -143,13 +161,6 @@ function receive(message) {
   if (message.lost !== undefined) lost = message.lost;
   at(message.now);
   forgetOldest();
-}
-
-// A robot that is stopped closes nothing: it only falls silent.
-function isSilent() {
-  if (isOver || refusal) return;
-  since ??= new Date(Date.now() - mostSilence);
-  show();
 }
 
 // --- What is shown ----------------------------------------------------------

@@ -6,7 +6,7 @@ module Live.ServerSpec (spec) where
 
 import Control.Concurrent.Async (concurrently, mapConcurrently, wait, withAsync)
 import Control.Concurrent.STM
-import Control.Exception (Handler (..), catches, evaluate, try)
+import Control.Exception (Handler (..), catches, evaluate)
 import Control.Monad (forM_, replicateM_, (>=>))
 import Data.Aeson (Value (..), encode, object, (.=))
 import Data.Bifunctor (bimap)
@@ -20,6 +20,7 @@ import Network.Socket hiding (listen)
 import Network.Socket.ByteString (recv, sendAll)
 import Network.Wai.Handler.Warp (testWithApplication)
 import qualified Network.WebSockets as Websockets
+import System.IO.Error (isResourceVanishedError)
 import System.Timeout (timeout)
 import Test.Hspec hiding (before)
 
@@ -108,8 +109,7 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
       reading port plainly $ \connection -> do
         ["hello", "snapshot"] `followBy` connection
         Websockets.sendTextData connection ("stop the robot" :: Text)
-        gone <- try (next connection)
-        either (const "closed" :: Websockets.ConnectionException -> String) message gone `shouldBe` "closed"
+        orWhyNot (message <$> next connection) `shouldReturn` Left "closed"
     it "is one of 32 at most" $ serving Nothing $ \shown port -> do
       full <- newTVarIO (0 :: Int)
       let stays = reading port plainly $ \connection -> do
@@ -183,12 +183,18 @@ tell shown new = do
 
 -- The kind of the first message, or why there is none.
 attached :: Int -> Websockets.Headers -> Value -> IO (Either String String)
-attached port headers said =
-  (Right . message <$> attachedBy port headers said next) `catches`
+attached port headers said = orWhyNot (message <$> attachedBy port headers said next)
+
+-- What comes; or the status of a refused handshake, or that the connection was closed. (Of one that is closed before
+-- all has been read, the system says that it was reset.)
+orWhyNot :: IO a -> IO (Either String a)
+orWhyNot act =
+  (Right <$> act) `catches`
     [ Handler $ \e -> pure . Left $ case e of
         Websockets.MalformedResponse response _ -> show (Websockets.responseCode response)
         other -> show other
     , Handler $ \e -> Left "closed" <$ evaluate (e :: Websockets.ConnectionException)
+    , Handler $ \e -> if isResourceVanishedError e then pure (Left "closed") else ioError e
     ]
 
 firstFrom :: Int -> Websockets.Headers -> Value -> IO String

@@ -34,9 +34,10 @@ spec :: Spec
 spec = around_ (race watchdog >=> either (const (expectationFailure "not over after 20 s of work")) pure) $ do
   describe "Twice as many events take about twice as much work (if not four times)" . forM_ shapes $ \(shape, made) ->
     describe shape . forM_ views $ \(view, work) -> it view $ do
-      -- (Logarithms make it a little more than two.)
+      -- (Logarithms make it a little more than two, and a buffer, of 32 KiB, is counted as a whole. What is
+      -- quadratic takes more than that: 4,000 times 4,000 bytes.)
       [less, more] <- mapM (allocatedBy work . made) [2000, 4000]
-      fromIntegral more / fromIntegral less `shouldSatisfy` (< (2.5 :: Double))
+      fromIntegral more / fromIntegral (less + 2 * 32768) `shouldSatisfy` (< (2.5 :: Double))
   describe "A hundred thousand spans in each other" . forM_ views $ \(view, work) ->
     it view $ evaluate (work (inEachOther 100000 Named Succeeded)) >>= (`shouldSatisfy` (> 0))
   it "A hundred thousand operators in each other leave the spans with names" $

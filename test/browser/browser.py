@@ -3,6 +3,7 @@
 import json
 
 from selenium import webdriver
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
 from robot import FOLDER, until
@@ -99,6 +100,9 @@ class Browser:
     def tree(self):
         """The names that run, without their marks."""
         return [text[2:] for text in self.texts("#tree li .span")]
+
+    def press(self, keys):
+        ActionChains(self.driver).send_keys(keys).perform()
 
     def heap(self):
         """The bytes of the page's heap, without what is garbage."""

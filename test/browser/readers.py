@@ -41,32 +41,41 @@ def reading(port, **attach):
         yield map(json.loads, connection)
 
 
-@contextlib.contextmanager
-def tunnel(port):
+class tunnel(contextlib.AbstractContextManager):
     """Another port, at which everything is passed on to that one: as ssh -L does."""
-    listening = socket.create_server(("127.0.0.1", 0))
 
-    def passing(one, other):
-        with contextlib.suppress(OSError):
-            while part := one.recv(65536):
-                other.sendall(part)
-        for end in (one, other):
-            with contextlib.suppress(OSError):
-                end.shutdown(socket.SHUT_RDWR)
+    def __init__(self, to):
+        self.to, self.frozen = to, set()
+        self.listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listening.getsockname()[1]
+        self.open = set()
+        threading.Thread(target=self.accept, daemon=True).start()
 
-    def accepting():
+    def __exit__(self, *_):
+        self.listening.close()
+
+    def freeze(self):
+        """Of the connections that there are, no byte is passed on any more, nor their end."""
+        self.frozen = set(self.open)
+
+    def accept(self):
         with contextlib.suppress(OSError):
             while True:
-                here, _ = listening.accept()
-                there = socket.create_connection(("127.0.0.1", port))
+                here, _ = self.listening.accept()
+                there = socket.create_connection(("127.0.0.1", self.to))
+                self.open.add(here)
                 for ends in ((here, there), (there, here)):
-                    threading.Thread(target=passing, args=ends, daemon=True).start()
+                    threading.Thread(target=self.carry, args=(here, *ends), daemon=True).start()
 
-    threading.Thread(target=accepting, daemon=True).start()
-    try:
-        yield listening.getsockname()[1]
-    finally:
-        listening.close()
+    def carry(self, connection, one, other):
+        with contextlib.suppress(OSError):
+            while part := one.recv(65536):
+                if connection not in self.frozen:
+                    other.sendall(part)
+        if connection not in self.frozen:
+            for end in (one, other):
+                with contextlib.suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
 
 
 @contextlib.contextmanager

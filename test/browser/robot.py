@@ -77,11 +77,15 @@ class Robot:
 
 
 def running(events):
-    """The events "began" of the spans that run after these, by number."""
-    open_ = {}
+    """The events "began" of the spans that run after these, by their numbers."""
+    begun = {}
     for event in events:
         if event["event"] == "began":
-            open_[event["number"]] = event
+            begun[event["number"]] = event
         elif event["event"] == "ended":
-            open_.pop(event["number"], None)
-    return open_
+            begun.pop(event["number"], None)
+    return [begun[number] for number in sorted(begun)]
+
+
+def names_running(events):
+    return [event["name"] for event in running(events) if event["kind"] == "named"]

@@ -41,7 +41,8 @@ application :: Shown -> Application
 application shown request respond = case forbidden of
   Just why -> respond (refused status403 why)
   Nothing
-    | isWebSocketsReq request -> maybe (respond (refused status404 "the websocket is /live")) respond (reader request)
+    | isWebSocketsReq request, pathInfo request == ["live"] -> respond reader
+    | isWebSocketsReq request -> respond (refused status404 "the websocket is /live")
     | requestMethod request `notElem` ["GET", "HEAD"] -> respond (refused status405 "allowed: GET")
     | otherwise -> respond (maybe (refused status404 "there is no such file") file (pageFile (pathInfo request)))
  where
@@ -50,14 +51,11 @@ application shown request respond = case forbidden of
     | onlyHere shown, Just why <- refusedHost (header "Host") = Just why
     | isWebSocketsReq request = refusedOrigin (isJust (token shown)) (header "Host") (header "Origin")
     | otherwise = Nothing
-  reader this
-    | pathInfo this == ["live"] = Just (responseRaw (connected this) (refused status404 "this is for websockets"))
-    | otherwise = Nothing
-  connected this source sink = do
+  reader = flip responseRaw (refused status404 "this is for websockets") $ \source sink -> do
     said <- newIORef 0
     answered <- newIORef True
     let options = readerOptions {connectionOnPong = writeIORef answered True}
-    runWebSockets options (getRequestHead this) (accepting shown answered) (bounded said source) (inTime sink)
+    runWebSockets options (getRequestHead request) (accepting shown answered) (bounded said source) (inTime sink)
   file (kind, content) = responseLBS status200 ((hContentType, kind) : always) (Bytes.fromStrict content)
   refused status why =
     responseLBS status ((hContentType, "text/plain; charset=utf-8") : always) (Char8.pack (why ++ "\n"))
@@ -147,24 +145,25 @@ telling shown say ping wanted = do
   cursor <- case knownUntil wanted of
     Just (known, n) | known == Text.pack (runName (run shown)), Just _ <- chunksFrom n begun -> pure n
     _ -> whole begun
-  follow (0 :: Int) (-1) cursor
+  follow (0 :: Int) 0 cursor
  where
-  -- The number of beats, the time of the last one, and the number of the event to tell next.
-  follow beatsSaid before cursor = do
+  -- How many beats there were, when the next one is due, and the number of the event to tell next.
+  follow beats due cursor = do
     t <- getMonotonicTime
-    let beats = t - before >= beatEvery
-        latestBeat = if beats then t else before
-    when beats $ atTime beat =<< readTVarIO (history shown)
-    when (beats && beatsSaid `mod` 16 == 0) ping
-    _ <- timeout (ceiling (1000000 * (latestBeat + beatEvery - t))) . atomically $ do
+    if t < due then waiting (due - t) cursor >>= maybe (pure ()) (follow beats due) else do
+      atTime beat =<< readTVarIO (history shown)
+      when (beats `mod` 16 == 0) ping
+      follow (beats + 1) (t + 0.3) cursor
+  -- Sends what comes in that time; then the next number, or nothing if all is over.
+  waiting time cursor = do
+    _ <- timeout (ceiling (1000000 * time)) . atomically $ do
       next <- nextNumber <$> readTVar (history shown)
       complete <- readTVar (isComplete shown)
       check (next /= cursor || complete)
     (after, complete) <- atomically ((,) <$> readTVar (history shown) <*> readTVar (isComplete shown))
-    cursor' <- case chunksFrom cursor after of
+    next <- case chunksFrom cursor after of
       Just new -> nextNumber after <$ traverse_ (say . eventsMessage) new
       Nothing -> whole after
-    if complete then atTime over after else follow (if beats then beatsSaid + 1 else beatsSaid) latestBeat cursor'
+    if complete then Nothing <$ atTime over after else pure (Just next)
   whole current = nextNumber current <$ atTime snapshotMessage current
   atTime message current = clock shown current >>= \t -> say (message t current)
-  beatEvery = 0.3

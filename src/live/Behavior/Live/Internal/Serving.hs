@@ -103,8 +103,9 @@ showing :: Listener -> (Maybe Text -> Bool -> IO Shown) -> (Shown -> IO a) -> IO
 showing (Listener listener secret here) new use = do
   shown <- new secret here
   connections <- newTVarIO (0 :: Int)
-  let isOpen n _ = atomically $ stateTVar connections (\m -> (m < mostConnections, m + n))
-      settings = setOnOpen (isOpen 1) . setOnClose (void . isOpen (-1)) . setTimeout 10 $ quietly defaultSettings
+  let opened _ = atomically (stateTVar connections (\n -> (n < mostConnections, n + 1)))
+      closed _ = atomically (modifyTVar' connections (subtract 1))
+      settings = setOnOpen opened . setOnClose closed . setTimeout 10 $ quietly defaultSettings
   withAsync (publishing shown) $ \publisher ->
     withAsync (runSettingsSocket settings listener (application shown)) $ \_ ->
       use shown `finally` (finish shown >> timeout 1000000 (wait publisher >> allHaveRead shown))
