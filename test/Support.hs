@@ -14,6 +14,7 @@ module Support
   , within
   , leavingNothing
   , onOneCapability
+  , everywhere
   , sampling
 
     -- * Gates
@@ -23,7 +24,6 @@ module Support
   , openAll
   , pass
   , passed
-  , untilOpen
   , hang
 
     -- * The log
@@ -43,6 +43,8 @@ module Support
   , awaitIdle
   , awaitOver
   , eventually
+  , collecting
+  , collectingUntil
 
     -- * The threads that the library starts
   , ThreadEvent (..)
@@ -74,6 +76,7 @@ import Data.Foldable (for_, traverse_)
 import Data.Maybe (isJust, isNothing)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
 import System.Environment (lookupEnv)
+import System.Mem (performMajorGC)
 import System.Mem.Weak (deRefWeak)
 import System.Timeout (timeout)
 import Test.Hspec (Spec, around_, expectationFailure, runIO)
@@ -130,13 +133,16 @@ leavingNothing act = mask $ \restore -> do
 onOneCapability :: IO a -> IO a
 onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCapabilities . const
 
--- | Tries that many random inputs where all tests run under all runtimes (the variable @EVERYWHERE@ is set, as in
--- CI), and a third of them otherwise. With @--qc-max-success@, that many of what is cheapest: the number here is
--- the share of it, in 3,000.
+-- | Whether all is tried: the variable @EVERYWHERE@ is set, as in CI.
+everywhere :: IO Bool
+everywhere = isJust <$> lookupEnv "EVERYWHERE"
+
+-- | Tries that many random inputs 'everywhere', and a sixth of them otherwise. With @--qc-max-success@, that many of
+-- what is cheapest: the number here is the share of it, in 3,000.
 sampling :: Int -> Spec -> Spec
 sampling share tests = do
-  everywhere <- runIO (isJust <$> lookupEnv "EVERYWHERE")
-  let least = if everywhere then share else share `div` 3
+  isAll <- runIO everywhere
+  let least = if isAll then share else share `div` 6
   modifyMaxSuccess (\asked -> max least (asked * share `div` 3000)) tests
 
 -- | Blocks the threads that pass it until it is opened; it is never closed again.
@@ -158,11 +164,6 @@ pass = atomically . passed
 
 passed :: Gate -> STM ()
 passed (Gate state) = readTVar state >>= check
-
--- | Repeats the action until the gate is open.
-untilOpen :: Gate -> IO () -> IO ()
-untilOpen gate@(Gate state) act =
-  readTVarIO state >>= \isOpen -> unless isOpen (act >> untilOpen gate act)
 
 -- | Blocks until it is interrupted.
 hang :: IO a
@@ -263,6 +264,15 @@ awaitOver thread = eventually $ (`elem` [ThreadFinished, ThreadDied]) <$> thread
 -- | Repeats the check until it gives 'True', and yields in between.
 eventually :: IO Bool -> IO ()
 eventually holds = holds >>= \isTrue -> unless isTrue (yield >> eventually holds)
+
+-- | Collects garbage, whereupon GHC finds deadlocks; then it pauses: what collects again and again would leave no time
+-- to the threads of other capabilities.
+collecting :: IO ()
+collecting = performMajorGC >> threadDelay 500
+
+-- | Collects garbage until the gate is open.
+collectingUntil :: Gate -> IO ()
+collectingUntil (Gate state) = eventually (collecting >> readTVarIO state)
 
 -- | How an action ended. Exceptions are compared by their class and their text.
 data Ending a

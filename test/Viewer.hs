@@ -2,6 +2,7 @@ module Main (main) where
 
 import Test.Hspec
 
+import Support (sampling)
 import qualified Viewer.DiffSpec
 import qualified Viewer.FileSpec
 import qualified Viewer.FormatSpec
@@ -23,7 +24,7 @@ import qualified Viewer.ViewingSpec
 import qualified Viewer.WorkSpec
 
 main :: IO ()
-main = hspec $ do
+main = hspec . sampling 100 $ do
   describe "The file of a trace" $ do
     Viewer.FileSpec.spec
     Viewer.FormatSpec.spec

@@ -12,7 +12,6 @@ import Data.Foldable (for_)
 import Data.IORef
 import Data.List (isInfixOf)
 import GHC.Conc (getUncaughtExceptionHandler, setUncaughtExceptionHandler)
-import System.Mem (performMajorGC)
 import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
 
@@ -127,7 +126,7 @@ spec = guarded . describe "abandoning" $ do
       _ <- cancelling
         (abandoning 0.001 (uninterruptibleMask_ (open entered >> (newEmptyMVar >>= takeMVar :: IO ()))))
         (pass entered)
-      eventually (performMajorGC >> (== 2) . length <$> notes calls)
+      eventually (collecting >> (== 2) . length <$> notes calls)
     last <$> notes calls
       `shouldReturn` "abandoning: a behaviour that was abandoned has ended with " ++ show BlockedIndefinitelyOnMVar
 

@@ -8,7 +8,6 @@ import Control.Concurrent
 import Control.Concurrent.Async (asyncThreadId, cancel, race_, waitCatchSTM)
 import Control.Exception
 import Control.Monad (forM_, void)
-import System.Mem (performMajorGC)
 import qualified System.Timeout as System
 import Test.Hspec
 
@@ -139,7 +138,7 @@ cancelled = do
               deadlock `catch` \BlockedIndefinitelyOnMVar -> note entries "recovered"
       -- GHC detects a deadlock when it collects garbage, which this thread makes it do; the
       -- thread holds no reference to any thread.
-      _ <- forkIO $ pass cleaning >> untilOpen recovered (performMajorGC >> yield)
+      _ <- forkIO $ pass cleaning >> collectingUntil recovered
       withThread (leavingNothing (placed place act)) $ \caller -> do
         pass inside
         throwTo (asyncThreadId caller) theCancel

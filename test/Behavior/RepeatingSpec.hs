@@ -2,13 +2,12 @@
 -- Trying again after a pause, and doing something periodically.
 module Behavior.RepeatingSpec (spec) where
 
-import Control.Concurrent (ThreadId, forkIO, killThread, mkWeakThreadId, yield)
+import Control.Concurrent (ThreadId, forkIO, killThread, mkWeakThreadId)
 import Control.Exception
 import Control.Monad (forever, replicateM_, void, when)
 import Data.Foldable (for_, traverse_)
 import Data.IORef
 import Data.Maybe (isJust)
-import System.Mem (performMajorGC)
 import System.Mem.Weak (Weak, deRefWeak)
 import Test.Hspec
 import Test.Hspec.QuickCheck (prop)
@@ -125,7 +124,6 @@ endless = do
     let -- (What has a thread's id keeps GHC from taking it for deadlocked.)
         unreachable :: IO () -> IORef (Maybe (Ending ())) -> IO (Weak ThreadId)
         unreachable act end = forkIO (ending act >>= writeIORef end . Just) >>= mkWeakThreadId
-        collecting = performMajorGC >> yield
     ofHang <- newIORef Nothing
     ofSleep <- newIORef Nothing
     sleeping <- unreachable (sleepForever ||| sleepForever) ofSleep

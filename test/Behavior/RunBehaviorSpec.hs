@@ -19,7 +19,6 @@ import Foreign.C (CInt (..))
 import GHC.Conc (ThreadStatus (..), threadStatus)
 import System.Exit (ExitCode (..))
 import System.IO (hFlush, hGetContents, hGetLine, hPutStrLn, stderr, stdout)
-import System.Mem (performMajorGC)
 import System.Posix.IO (closeFd, createPipe, dupTo, fdToHandle, stdError)
 import System.Posix.Process (ProcessStatus (..), exitImmediately, forkProcess, getProcessStatus)
 import System.Posix.Signals
@@ -264,7 +263,7 @@ spec = guarded . describe "runBehavior" $ do
     found <- newGate
     inside <- newGate
     let deadlock = open inside >> newEmptyMVar >>= takeMVar :: IO ()
-    _ <- forkIO $ pass inside >> untilOpen found (performMajorGC >> yield)
+    _ <- forkIO $ pass inside >> collectingUntil found
     withThread (runBehavior deadlock) $ \caller -> do
       end <- endingOf <$> awaitUninterruptibly (atomically (waitCatchSTM caller))
       open found

@@ -16,7 +16,6 @@ import GHC.Conc (unsafeIOToSTM)
 #if MIN_VERSION_base(4,18,0)
 import GHC.Conc.Sync (threadLabel)
 #endif
-import System.Mem (performMajorGC)
 import Test.Hspec hiding (parallel)
 
 import Behavior (Failed (..), StoppedWithFault (..), both, failed, parallel)
@@ -201,7 +200,7 @@ waiting = do
       thread <- mask_ (start label (deadlocked >> deadlocked >> deadlocked))
       void (awaitUninterruptibly (atomically (threadEnd thread)))
       note entries "awaited"
-    eventually (performMajorGC >> elem "awaited" <$> notes entries)
+    eventually (collecting >> elem "awaited" <$> notes entries)
     notes entries `shouldReturn` ["deadlocked", "deadlocked", "deadlocked", "awaited"]
 
   it "has a checkpoint where a cancellation arrives that was masked until then" $ do

@@ -22,6 +22,7 @@ import Behavior.Trace.Describe
 import Behavior.Trace.File
 import Behavior.Trace.Otlp
 import Behavior.Trace.Recording
+import Support (sampling)
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
@@ -31,7 +32,7 @@ spec = do
   describe "of a mission" (golden "mission-otlp.json" (render mission))
   describe "with all kinds of events" (golden "detailed-otlp.json" (render detailed))
   it "is one line" $ Bytes.elemIndices '\n' (render mission) `shouldBe` [Bytes.length (render mission) - 1]
-  it "has each span once, in its parent, with its own times" . withMaxSuccess 1000 . property $ \(Related events) ->
+  sampling 1000 . it "has each span once, in its parent, with its own times" . property $ \(Related events) ->
     let r = recording events
         expected parent n = (name n, parent, began n, max (began n) (time (nodeUntil r n))) : inside n
         inside n = concatMap (expected (Just (name n))) (nodeChildren n)

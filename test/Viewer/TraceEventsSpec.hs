@@ -19,6 +19,7 @@ import Test.QuickCheck
 import Behavior.Trace
 import Behavior.Trace.Recording
 import Behavior.Trace.TraceEvents
+import Support (sampling)
 import Viewer.Examples
 import Viewer.Generate
 import Viewer.Golden
@@ -27,7 +28,7 @@ spec :: Spec
 spec = do
   describe "of a mission" (golden "mission-trace-events.json" (render mission))
   describe "with all kinds of events" (golden "detailed-trace-events.json" (render detailed))
-  it "has lanes that nest and flows with both ends" . withMaxSuccess 1000 . property $ \(Related events) ->
+  sampling 1000 . it "has lanes that nest and flows with both ends" . property $ \(Related events) ->
     checked (render events) === []
   it "has them with any times and texts" . property $ \(AnyEvents events) -> checked (render events) === []
   it "has each span once, with its own times" . property $ \(Related events) ->
@@ -47,7 +48,7 @@ spec = do
           in counterexample
               (show (expected, found))
               (length found == length expected && and (zipWith near expected found))
-  it "has a span on a lane inside those only that it really ran in" . withMaxSuccess 1000 . property $
+  sampling 1000 . it "has a span on a lane inside those only that it really ran in" . property $
     \(Related events) ->
       let r = recording events
           outer = Map.fromList (concatMap (surround []) (recordingRoots r))
