@@ -15,6 +15,7 @@ module Support
   , leavingNothing
   , onOneCapability
   , everywhere
+  , sampleSize
   , sampling
 
     -- * Gates
@@ -137,12 +138,15 @@ onOneCapability = bracket (getNumCapabilities <* setNumCapabilities 1) setNumCap
 everywhere :: IO Bool
 everywhere = isJust <$> lookupEnv "EVERYWHERE"
 
--- | Tries that many random inputs 'everywhere', and a sixth of them otherwise. With @--qc-max-success@, that many of
--- what is cheapest: the number here is the share of it, in 3,000.
+-- | That many random inputs 'everywhere', and a sixth of them otherwise.
+sampleSize :: Int -> IO Int
+sampleSize number = everywhere >>= \isAll -> pure (if isAll then number else number `div` 6)
+
+-- | Tries that many random inputs, or a sixth of them ('sampleSize'). With @--qc-max-success@, that many of what is
+-- cheapest: the number here is the share of it, in 3,000.
 sampling :: Int -> Spec -> Spec
 sampling share tests = do
-  isAll <- runIO everywhere
-  let least = if isAll then share else share `div` 6
+  least <- runIO (sampleSize share)
   modifyMaxSuccess (\asked -> max least (asked * share `div` 3000)) tests
 
 -- | Blocks the threads that pass it until it is opened; it is never closed again.

@@ -9,11 +9,11 @@ import Test.Hspec
 import Promises.Stage (promised)
 import Promises.Trying
 import Ros.Promised
-import Support (everywhere)
+import Support (sampleSize)
 
 spec :: Spec
 spec = do
-  schedules <- runIO everywhere >>= \isAll -> pure (if isAll then 2000 else 300)
+  schedules <- runIO (sampleSize 2000)
   it (promised keptByMissions) $ do
     tried <- underRandom 1 schedules keptByMissions
     schedulesExplored tried `shouldSatisfy` (>= schedules)

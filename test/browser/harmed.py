@@ -10,7 +10,7 @@ import unicodedata
 
 from browser import Browser, delays
 from claims import all_of, at_most, claim, percentile
-from readers import Silent, ask, connections, tunnel, upgrade
+from readers import Silent, Tunnel, ask, connections, upgrade
 from robot import FOLDER, Robot, until
 
 
@@ -58,7 +58,7 @@ def row_8():
             claim(8, what, f"{status} {text.splitlines()[-1][:60]}", "403", status == 403)
         status, _ = ask(robot.port, upgrade(own, "http://" + own), "/live")
         claim(8, "its own Origin", status, "101", status == 101)
-        with tunnel(robot.port) as passing, Browser() as browser:
+        with Tunnel(robot.port) as passing, Browser() as browser:
             browser.driver.get(f"http://127.0.0.1:{passing.port}/")
             browser.comes("live", 5)
             claim(8, "another port, by a tunnel", browser.state(), "live", browser.state() == "live")

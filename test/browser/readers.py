@@ -41,7 +41,7 @@ def reading(port, **attach):
         yield map(json.loads, connection)
 
 
-class tunnel(contextlib.AbstractContextManager):
+class Tunnel(contextlib.AbstractContextManager):
     """Another port, at which everything is passed on to that one: as ssh -L does."""
 
     def __init__(self, to):

@@ -7,7 +7,7 @@ import time
 
 from browser import Browser, delays
 from claims import all_of, at_most, claim, percentile
-from readers import reading, tunnel
+from readers import Tunnel, reading
 from robot import Robot, names_running, running, until
 
 
@@ -125,7 +125,7 @@ def row_4():
             held = browser.js("reactions.map((r) => r.number)")
             claim(4, "reactions in the page, equal to the robot's", len(held), len(own), held[:len(own)] == own)
     # Its machine vanishes: nothing closes the connection, and no byte comes any more.
-    with Robot("work") as robot, tunnel(robot.port) as passing, Browser() as browser:
+    with Robot("work") as robot, Tunnel(robot.port) as passing, Browser() as browser:
         browser.driver.get(f"http://127.0.0.1:{passing.port}/")
         browser.comes("live", 5)
         passing.freeze()

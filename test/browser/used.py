@@ -3,6 +3,7 @@
 import collections
 import json
 import os
+import shutil
 import subprocess
 import sys
 
@@ -187,7 +188,8 @@ def pictures():
     """Pictures of three missions, in two sizes, light and dark: for someone who has not seen the page to look at."""
     missions = {"door-battery": ["door-battery", "--program", "names"], "patrol": ["robots", "patrol"],
                 "fleet": ["robots", "fleet"]}
-    os.makedirs(FOLDER + "/pictures", exist_ok=True)
+    shutil.rmtree(FOLDER + "/pictures", ignore_errors=True)
+    os.makedirs(FOLDER + "/pictures")
     for name, (program, *arguments) in missions.items():
         file = f"{FOLDER}/{name}.jsonl"
         subprocess.run([f"{FOLDER}/{program}", *arguments, "--simulate", "--trace", file], check=True,
