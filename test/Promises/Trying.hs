@@ -42,11 +42,11 @@ instance Show Tried where
       ++ show (pointsTried t)
       ++ " scheduling points"
 
--- | Tests the given number of random schedules in all, of random programs. The first argument
+-- | Tests at least the given number of random schedules in all, of random programs. The first argument
 -- is the number of the first program.
 underRandom :: Int -> Int -> Promise -> IO Tried
 underRandom from n (Promise text gen keeping) =
-  mconcat <$> mapM one (take (n `div` perProgram) [from ..])
+  mconcat <$> mapM one (take ((n + perProgram - 1) `div` perProgram) [from ..])
  where
   one i =
     let program = programFrom (gen Full) (seedOf text i)
