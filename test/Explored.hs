@@ -6,7 +6,9 @@ module Main (main) where
 import Test.Hspec
 
 import qualified Behavior.ReactiveSpaceSpec
+import qualified Behavior.ResumableSimSpec
 import qualified Behavior.ScaleSpec
+import qualified Behavior.SemaphoreSimSpec
 import qualified Behavior.SpaceSpec
 import qualified Examples.DoorBatterySpec
 import qualified Examples.DroneSpec
@@ -35,7 +37,14 @@ import qualified Trace.ProgramsSpec
 
 main :: IO ()
 main = hspec $ do
+  -- (First: it waits for clocks and sockets, while other programs need the processors.)
+  describe "The live page" $ do
+    Live.HistorySpec.spec
+    Live.ServerSpec.spec
+    describe "A trace file" Live.FollowingSpec.spec
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
+  describe "resumable" Behavior.ResumableSimSpec.spec
+  describe "withTSem" Behavior.SemaphoreSimSpec.spec
   describe "Specification" SemanticsSpec.spec
   describe "Traces of random programs" $ do
     Trace.ProgramsSpec.spec
@@ -64,7 +73,3 @@ main = hspec $ do
     Behavior.SpaceSpec.spec
     Behavior.ReactiveSpaceSpec.spec
     Behavior.ScaleSpec.spec
-  describe "The live page" $ do
-    Live.HistorySpec.spec
-    Live.ServerSpec.spec
-    describe "A trace file" Live.FollowingSpec.spec
