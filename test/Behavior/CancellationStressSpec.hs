@@ -32,8 +32,8 @@ import Support
 
 spec :: Spec
 spec = guarded . describe "Thousands of cancellations at random moments" $ do
-  sampling 3000 . it "leave nothing running, with every operator nested in every other" $
-    property $ \(Nest nest) leaf (Moments moments) ->
+  it "leave nothing running, with every operator nested in every other" $
+    property . withMaxSuccess 3000 $ \(Nest nest) leaf (Moments moments) ->
       ioProperty $ do
         inside <- newIORef (0 :: Int)
         let act = foldr placed (perform inside leaf) nest
@@ -43,8 +43,8 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
           tabulate "it ended" [kindOf end] $
             counterexample (show end) (left === 0 .&&. end `among` leaf)
 
-  sampling 2000 . it "leave nothing running in a tree of operators whose conditions change continually" $
-    property $ \tree (Moments moments) ->
+  it "leave nothing running in a tree of operators whose conditions change continually" $
+    property . withMaxSuccess 2000 $ \tree (Moments moments) ->
       ioProperty $ do
         inside <- newIORef (0 :: Int)
         input <- newTVarIO (0 :: Int)
@@ -72,8 +72,8 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
       end <- cancellingAt [n `mod` 31] (leavingNothing act)
       end `shouldBe` CancelledBy (show (Cancel "the stress test"))
 
-  sampling 2000 . it "lose no fault that a branch has thrown" $
-    property $
+  it "lose no fault that a branch has thrown" $
+    property . withMaxSuccess 2000 $
       forAll (elements branches) $ \place (NonNegative n) (Moments moments) ->
         ioProperty $ do
           thrown <- newIORef False
@@ -89,9 +89,8 @@ spec = guarded . describe "Thousands of cancellations at random moments" $ do
               CancelledWithFault _ fault -> fault === show (Fault "branch")
               _ -> wasThrown === False
 
-  sampling 1000 . it "do not separate a failure from its alternative: \
-    \the caller is cancelled, or the alternative runs" $
-    property $ \(NonNegative n) (Moments moments) ->
+  it "do not separate a failure from its alternative: the caller is cancelled, or the alternative runs" $
+    property . withMaxSuccess 1000 $ \(NonNegative n) (Moments moments) ->
       ioProperty $ do
         (end, done) <- do
           entries <- newLog
