@@ -21,6 +21,7 @@ import qualified Examples.TestingARobotSpec
 import qualified Examples.YourOwnMonadSpec
 import qualified Live.FollowingSpec
 import qualified Live.HistorySpec
+import qualified Live.HubSpec
 import qualified Live.ServerSpec
 import qualified Promises.PromisesSimSpec
 import qualified Ros.CallSpec
@@ -40,6 +41,7 @@ main = hspec $ do
   -- (First: it waits for clocks and sockets, while other programs need the processors.)
   describe "The live page" $ do
     Live.HistorySpec.spec
+    describe "Many robots" Live.HubSpec.spec
     Live.ServerSpec.spec
     describe "A trace file" Live.FollowingSpec.spec
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec

@@ -11,6 +11,7 @@ import Control.Exception (IOException, displayException, evaluate, try)
 import Control.Monad (when)
 import Control.Monad.Trans.Except (ExceptT (..), runExceptT, throwE)
 import qualified Data.ByteString.Lazy as Lazy
+import qualified Data.Text as Text
 import Data.Text.Lazy.Encoding (encodeUtf8)
 import Options.Applicative
 import System.Directory (canonicalizePath)
@@ -19,6 +20,7 @@ import System.FilePath (takeBaseName, takeFileName)
 
 import Behavior (runBehavior, sleep)
 import Behavior.Live (LivePage (..), loopback)
+import Behavior.Live.Hub (hub)
 import Behavior.Live.Internal.Following (showFile)
 import Behavior.Trace (Event)
 import Behavior.Trace.Describe (inert)
@@ -31,7 +33,10 @@ import Behavior.Trace.Svg
 import Behavior.Trace.TraceEvents
 import Behavior.Trace.Tree
 
-data Options = Options FilePath Mode
+data Options
+  = OfFile FilePath Mode
+  | -- | Shows these robots, each by its name and the address of its live page, on one page.
+    Hub [(String, String)]
 
 data Mode
   = -- | Prints a text.
@@ -47,8 +52,8 @@ data Mode
 -- standard output and on the standard error output.
 run :: [String] -> IO (ExitCode, String, String)
 run arguments = case execParserPure defaultPrefs commandLine arguments of
-  Success (Options file mode) -> do
-    result <- runExceptT (perform file mode)
+  Success options -> do
+    result <- runExceptT (performAll options)
     pure $ case result of
       Left problem -> (ExitFailure 2, "", problem ++ "\n")
       Right (printed, remarks) -> (ExitSuccess, printed, unlines remarks)
@@ -61,13 +66,23 @@ run arguments = case execParserPure defaultPrefs commandLine arguments of
 
 commandLine :: ParserInfo Options
 commandLine =
-  info (helper <*> (Options <$> strArgument (metavar "FILE" <> help "the file of a trace") <*> modes)) $
+  info (helper <*> (ofFile <|> Hub <$> some ofRobot)) $
     fullDesc
       <> failureCode 2
       <> progDesc "Shows what a robot did, since when, and what interrupted it."
       <> footer
         "Exit status: 0, or 2 if the options are wrong or a file or the output cannot be read or written. A last line \
         \that is incomplete, because the program was killed, is no error, nor is a pipe that its reader closed."
+ where
+  ofFile = OfFile <$> strArgument (metavar "FILE" <> help "the file of a trace") <*> modes
+  ofRobot =
+    option (eitherReader nameAndAddress) $
+      long "hub" <> metavar "NAME=ADDRESS"
+        <> help "serve a page of all these robots until Ctrl-C: an address is that of the robot's live page"
+  -- (A name may have any characters; so may a token, but those of an address are escaped.)
+  nameAndAddress text = case Text.breakOnEnd (Text.pack "=http://") (Text.pack text) of
+    (name, rest) | not (Text.null name) -> Right (Text.unpack (Text.dropEnd 8 name), "http://" ++ Text.unpack rest)
+    _ -> Left "allowed: NAME=http://HOST:PORT/ or NAME=http://HOST:PORT/#TOKEN"
 
 modes :: Parser Mode
 modes =
@@ -88,6 +103,12 @@ modes =
  where
   ofRecording render _ _ = render
   writing name render what = Write render <$> strOption (long name <> metavar "OUT" <> help what)
+
+performAll :: Options -> ExceptT String IO (String, [String])
+performAll options = case options of
+  OfFile file mode -> perform file mode
+  -- (Robots on this machine have their own pages at the ports from 8420 on.)
+  Hub robots -> attempt (runBehavior (hub loopback {robot = "robots", pagePort = 8410} (pure robots))) >>= throwE
 
 perform :: FilePath -> Mode -> ExceptT String IO (String, [String])
 perform file mode = case mode of

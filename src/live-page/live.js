@@ -1,15 +1,13 @@
 "use strict";
 // The live page: reads the robot's messages (docs/live-protocol.md), and shows what they say. Texts are set when a
-// message comes, for a hidden tab draws no frames; only the bars wait for a frame.
+// message comes, for a hidden tab draws no frames; only the bars wait for a frame. (What it has in common with the page
+// of a hub is in page.js.)
 
 const mostSpans = 20000; // that have ended
 const mostReactions = 2000;
 const mostRows = 300; // in a list
 const mostLanes = 60; // of the timeline
 const mostSeconds = 60; // of the timeline
-const mostSilence = 700; // milliseconds: of the next two beats none has come
-const mostPatience = 10000; // and then another connection is tried
-const $ = (id) => document.getElementById(id);
 
 // --- What is known ----------------------------------------------------------
 
@@ -22,10 +20,7 @@ let next = null; // the number of the event that comes next, when one is known
 let lost = 0; // by the robot
 let missed = 0; // events of which only the summary came
 let robotTime = 0; // of the last message that has one
-let silence = null; // the timer of what happens when no message comes
-let since = null; // when it was disconnected
 let isOver = false;
-let refusal = null;
 
 const outcomeOf = (span) => (span.end ? span.end.how : "running");
 const marks = { running: "▶", succeeded: "✓", failed: "✗", faulted: "‼", stopped: "■" };
@@ -84,53 +79,6 @@ function forgetOldest() {
 
 // --- Messages ---------------------------------------------------------------
 
-function connect() {
-  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
-  // A robot that is stopped closes nothing: it only falls silent. One whose machine has vanished remains so.
-  const waitFor = (time, then) => {
-    clearTimeout(silence);
-    silence = setTimeout(then, time);
-  };
-  const giveUp = () => {
-    socket.onmessage = socket.onclose = null;
-    socket.close();
-    connect();
-  };
-  const isSilent = () => {
-    if (refusal) return;
-    if (!isOver) since ??= new Date(Date.now() - mostSilence);
-    show();
-    waitFor(mostPatience, giveUp);
-  };
-  waitFor(mostPatience, giveUp);
-  socket.onopen = () => {
-    const attach = { version: 1 };
-    if (location.hash.length > 1) attach.token = token(location.hash.slice(1));
-    if (next !== null) Object.assign(attach, { run: run.run, next });
-    socket.send(JSON.stringify(attach));
-  };
-  socket.onmessage = ({ data }) => {
-    waitFor(mostSilence, isSilent);
-    since = null;
-    receive(JSON.parse(data));
-    show();
-  };
-  socket.onclose = () => {
-    if (!isOver && !refusal) since ??= new Date();
-    show();
-    clearTimeout(silence);
-    if (!refusal) setTimeout(connect, 1000);
-  };
-}
-
-function token(text) {
-  try {
-    return decodeURIComponent(text);
-  } catch {
-    return text; // no address that the robot has printed
-  }
-}
-
 function receive(message) {
   switch (message.message) {
     case "hello":
@@ -167,15 +115,6 @@ function receive(message) {
 
 let pausedAt = null; // the time that is shown; null: the present
 let selected = null; // the number of a span or of a reaction
-const inertly = /[\p{Cc}\p{Cf}\p{Cs}\p{Co}\p{Zl}\p{Zp}]/gu;
-
-// A text of the robot's, on one line and of bounded length; nothing in it can act.
-function inert(text, most = 200) {
-  const short = text.length > most ? text.slice(0, most) + "…" : text;
-  return short.replace(inertly, (c) => `\\u{${c.codePointAt(0).toString(16)}}`);
-}
-
-const during = (time) => (time < 10 ? time.toFixed(1) : Math.round(time).toString()) + " s";
 const shownTime = () => pausedAt ?? robotTime;
 const runsAt = (span, time) => span.began <= time && (!span.end || span.ended > time);
 let word = ""; // that is searched
@@ -187,36 +126,6 @@ function pathOf(span) {
   const names = [];
   for (let s = span; s && names.length < 50; s = spans.get(s.parent)) names.unshift(inert(s.name, 60));
   return names;
-}
-
-function element(name, texts = [], attributes = {}) {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...texts);
-  return made;
-}
-
-// Rows that stay: their texts change, and so the focus stays where it is.
-function fill(list, items, make, write) {
-  const known = new Map([...list.children].map((row) => [row.dataset.key, row]));
-  let before = null;
-  for (const [key, item] of items) {
-    let row = known.get(key);
-    if (!row) {
-      row = make(item);
-      row.dataset.key = key;
-    }
-    known.delete(key);
-    const here = before ? before.nextSibling : list.firstChild;
-    if (here !== row) list.insertBefore(row, here);
-    write(row, item);
-    before = row;
-  }
-  for (const row of known.values()) row.remove();
-}
-
-function setText(node, text) {
-  if (node.textContent !== text) node.textContent = text;
 }
 
 // Each row about a span or a reaction has a button, which shows its details.
@@ -301,11 +210,6 @@ function showTree(time) {
     writeSpan(row, { ...span, end: undefined }, `since ${span.began.toFixed(1)} s, for ${during(time - span.began)}`);
     row.style.paddingLeft = `${Math.min(depth, 12)}rem`;
   });
-}
-
-function changeText(change) {
-  const was = change.before === undefined ? "" : ` (was ${inert(change.before, 60)})`;
-  return `${inert(change.signal, 60)} ${inert(change.after, 60)}${was}`;
 }
 
 // What a reaction says: when, why, and what it did.
@@ -605,4 +509,9 @@ for (const [how, mark] of Object.entries(marks)) {
   $("key").append(element("span", [`${mark} ${how}`], { class: how }), " ");
 }
 
-connect();
+connect({
+  receive: (message) => receive(message),
+  show: () => show(),
+  attach: () => (next === null ? {} : { run: run.run, next }),
+  isOver: () => isOver,
+});

@@ -5,6 +5,7 @@
 module Live.Reader
   ( -- * Connections
     reading
+  , readingAt
   , attachedBy
   , plainly
   , local
@@ -50,13 +51,20 @@ plainly = object ["version" .= (1 :: Int)]
 
 -- | Over a connection that has attached itself so.
 reading :: Int -> Value -> (Websockets.Connection -> IO a) -> IO a
-reading port = attachedBy port (local port)
+reading = readingAt "/live"
 
--- | The same with these headers.
+-- | The same of the websocket with this path.
+readingAt :: String -> Int -> Value -> (Websockets.Connection -> IO a) -> IO a
+readingAt path port = attachedAt path port (local port)
+
+-- | With these headers.
 attachedBy :: Int -> Websockets.Headers -> Value -> (Websockets.Connection -> IO a) -> IO a
-attachedBy port headers said use =
+attachedBy = attachedAt "/live"
+
+attachedAt :: String -> Int -> Websockets.Headers -> Value -> (Websockets.Connection -> IO a) -> IO a
+attachedAt path port headers said use =
   withConnection port $ \s ->
-    Websockets.runClientWithSocket s host "/live" Websockets.defaultConnectionOptions others $ \connection ->
+    Websockets.runClientWithSocket s host path Websockets.defaultConnectionOptions others $ \connection ->
       Websockets.sendTextData connection (encode said) >> use connection
  where
   host = maybe ("127.0.0.1:" ++ show port) Char8.unpack (lookup "Host" headers)

@@ -86,13 +86,17 @@ spec = around withMissions $ do
       , [folder </> "mission"]
       , [folder </> "mission", "--tree", "--summary"]
       , [folder </> "mission", "--picture"]
+      , [folder </> "mission", "--hub", "Ann=http://127.0.0.1:8420/"]
       ]
       $ run >=> failsWith "Usage: behavior-trace"
+  it "refuses to show robots without names and addresses, with status 2" $ \_ ->
+    forM_ ["Ann", "http://127.0.0.1:8420/", "Ann=127.0.0.1:8420"] $ \robot ->
+      run ["--hub", robot] >>= failsWith "NAME=http://HOST:PORT/"
   it "explains its options" $ \_ -> do
     (status, printed, _) <- run ["--help"]
     status `shouldBe` ExitSuccess
     let options = ["--tree", "--summary", "--svg OUT", "--trace-events OUT", "--otlp OUT", "--diff OTHER", "--live"]
-    forM_ options $ \option -> printed `shouldSatisfy` isInfixOf option
+    forM_ (options ++ ["--hub NAME=ADDRESS"]) $ \option -> printed `shouldSatisfy` isInfixOf option
  where
   failsWith why (status, printed, remarks) = do
     (status, printed) `shouldBe` (ExitFailure 2, "")

@@ -10,11 +10,13 @@ import sys
 import time
 
 import harmed
+import many
 import shown
 import used
 from claims import claim, end
 
-ROWS = {name: row for module in (shown, harmed, used) for name, row in vars(module).items() if name.startswith("row_")}
+MODULES = (shown, harmed, used, many)
+ROWS = {name: row for module in MODULES for name, row in vars(module).items() if name.startswith("row_")}
 
 for row in map(int, sys.argv[1:]):
     begun = time.monotonic()

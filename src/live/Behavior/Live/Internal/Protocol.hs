@@ -20,10 +20,12 @@ module Behavior.Live.Internal.Protocol
     -- * From a reader
   , Attach (..)
   , readAttach
+  , attachMessage
   ) where
 
 import Data.Aeson (eitherDecode, withObject, (.:), (.:?))
 import Data.Aeson.Encoding (Series, int, pair, pairs)
+import qualified Data.Aeson.Encoding as Encoding
 import Data.Aeson.Types (parseEither)
 import Data.ByteString.Builder (Builder, lazyByteString, toLazyByteString)
 import qualified Data.ByteString.Lazy.Char8 as Bytes
@@ -115,3 +117,11 @@ readAttach bytes = eitherDecode bytes >>= parseEither attach
   attach = withObject "attach" $ \o ->
     Attach <$> o .: "version" <*> o .:? "token" <*> (both <$> o .:? "run" <*> o .:? "next")
   both known n = (,) <$> known <*> n
+
+-- | The message of which 'readAttach' reads this.
+attachMessage :: Attach -> Bytes.ByteString
+attachMessage (Attach version shown known) =
+  toLazyByteString . written . pairs $
+    pair "version" (int version)
+      <> foldMap (pair "token" . Encoding.text) shown
+      <> foldMap (\(name, n) -> pair "run" (Encoding.text name) <> pair "next" (int n)) known

@@ -10,10 +10,11 @@ module Behavior.Live.Internal.Serving
   , report
 
     -- * Serving
-  , Listener
+  , Listener (..)
   , withListener
   , newRunName
   , showing
+  , serve
   ) where
 
 import Control.Concurrent.Async (wait, withAsync)
@@ -29,6 +30,7 @@ import Data.Time.Clock (NominalDiffTime)
 import Data.Time.Clock.POSIX (getPOSIXTime)
 import Network.HTTP.Types (urlEncode)
 import Network.Socket
+import Network.Wai (Application)
 import Network.Wai.Handler.Warp
   ( defaultSettings
   , runSettingsSocket
@@ -100,15 +102,20 @@ newRunName = (`showHex` "") . (round :: NominalDiffTime -> Integer) . (* 1000000
 -- | Serves one run, which is made for the token and whether only this machine reaches it, while the action runs. After
 -- the action, readers have a second to read the end, however it ends.
 showing :: Listener -> (Maybe Text -> Bool -> IO Shown) -> (Shown -> IO a) -> IO a
-showing (Listener listener secret here) new use = do
+showing listener@(Listener _ secret here) new use = do
   shown <- new secret here
+  withAsync (publishing shown) $ \publisher ->
+    withAsync (serve listener (application shown)) $ \_ ->
+      use shown `finally` (finish shown >> timeout 1000000 (wait publisher >> allHaveRead shown))
+
+-- | Serves the application.
+serve :: Listener -> Application -> IO ()
+serve (Listener listener _ _) served = do
   connections <- newTVarIO (0 :: Int)
   let opened _ = atomically (stateTVar connections (\n -> (n < mostConnections, n + 1)))
       closed _ = atomically (modifyTVar' connections (subtract 1))
       settings = setOnOpen opened . setOnClose closed . setTimeout 10 $ quietly defaultSettings
-  withAsync (publishing shown) $ \publisher ->
-    withAsync (runSettingsSocket settings listener (application shown)) $ \_ ->
-      use shown `finally` (finish shown >> timeout 1000000 (wait publisher >> allHaveRead shown))
+  runSettingsSocket settings listener served
  where
   quietly = setOnException (\_ _ -> pure ())
 
