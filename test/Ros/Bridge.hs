@@ -21,10 +21,10 @@ import System.IO
 import System.Process
 
 import Behavior
+import Behavior.Internal.Concurrent.Service
 import Behavior.Parallel (firstOf, fork, scoped)
 import Behavior.Ros
 import Behavior.Ros.Fake
-import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
 
 -- | Runs the behaviour with a way to the robot's bridge. (The bridge is there until the behaviour has ended, cleanup

@@ -17,12 +17,12 @@ import System.IO.Unsafe (unsafeInterleaveIO)
 import Test.Hspec hiding (parallel)
 
 import Behavior
+import Behavior.Internal.Concurrent.Service
 import Behavior.Parallel (firstOf)
 import Behavior.Ros
 import Behavior.Ros.Fake
 import Behavior.Ros.Internal.Frame (Limits (..), Request (SendGoal), decodeRequest)
 import Behavior.Ros.Internal.Link (outgoing, received)
-import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
 import Behavior.Ros.Messages
 import Behavior.STM

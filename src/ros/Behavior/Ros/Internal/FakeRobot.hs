@@ -34,11 +34,11 @@ import qualified Data.Map.Strict as Map
 import qualified Data.Text as Text
 
 import Behavior (Behavior, Seconds, sleep)
+import Behavior.Internal.Concurrent.Service
 import Behavior.Parallel (firstOf, fork, scoped)
 import Behavior.Ros.Internal.FakeScript
 import Behavior.Ros.Internal.FakeState
 import Behavior.Ros.Internal.Frame
-import Behavior.Ros.Internal.Service
 import Behavior.STM (atomically)
 import Behavior.Time (now)
 

@@ -19,6 +19,7 @@ import qualified Data.Text as Text
 import Prelude hiding (take)
 
 import Behavior (Behavior, Seconds, StoppedWithFault (..), sleep, tryAny, (?))
+import Behavior.Internal.Concurrent.Service
 import Behavior.Internal.Core.Seconds (duration)
 import Behavior.Internal.Spans.Observer (noticed)
 import Behavior.Parallel (firstOf, fork, scoped)
@@ -27,7 +28,6 @@ import Behavior.Ros.Internal.Link
 import Behavior.Ros.Internal.Options
 import Behavior.Ros.Internal.Receive
 import Behavior.Ros.Internal.Sent
-import Behavior.Ros.Internal.Service
 import Behavior.Ros.Internal.Transport
 import Behavior.Ros.Internal.UpDown
 import Behavior.STM (atomically)

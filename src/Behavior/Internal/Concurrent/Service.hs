@@ -4,16 +4,17 @@
 -- A service beside a behaviour.
 --
 -- Internal: any of it may change in any release.
-module Behavior.Ros.Internal.Service
+module Behavior.Internal.Concurrent.Service
   ( servedBy
   ) where
 
 import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
 import Control.Exception (finally, uninterruptibleMask_)
 
-import Behavior (Behavior)
-import Behavior.Parallel (firstOf, fork, scoped)
-import Behavior.STM (atomically)
+import Behavior.Internal.Concurrent.Nursery (fork, scoped)
+import Behavior.Internal.Concurrent.Parallel (firstOf)
+import Behavior.Internal.Core.Failure (Behavior)
+import Behavior.Internal.Seam.Runtime (atomically)
 
 -- | Runs the behaviour beside a service, which goes on until the behaviour has ended, cleanup included: what stops a
 -- robot must still reach it. (An operator requests the stop of all its branches together. So the thread of the
