@@ -1,5 +1,5 @@
 .PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak rules \
-  signals reality attacks robot robots browser mutants release ci clean
+  signals reality attacks robot robots fleet fleets browser mutants release ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -24,6 +24,10 @@ help:
 	@echo 'make robot     the mission of make demo on a simulated robot that speaks ROS, over a bridge'
 	@echo 'make robots    goals, topics and lost links with real action servers over a real bridge (ROWS="2 3"'
 	@echo '               selects; LONG=1: more often)'
+	@echo 'make fleet     20 robots in processes of their own carry 500 orders, and are killed; all that they share is in'
+	@echo '               a PostgreSQL that it starts'
+	@echo 'make fleets    robots, connections and databases that are killed, frozen and cut off (ROWS="1 2" selects;'
+	@echo '               LONG=1: more often)'
 	@echo 'make browser   the live page in Chromium (ROWS="2 3" selects)'
 	@echo 'make rules     the rules of the specification that no random program reaches'
 	@echo 'make mutants   small mistakes in the sources, which the tests must detect (NAMES="debounce" selects)'
@@ -73,6 +77,12 @@ robot:
 
 robots:
 	@.ci/robots $(ROWS)
+
+fleet:
+	@.ci/fleets mission
+
+fleets:
+	@.ci/fleets $(ROWS)
 
 browser:
 	@.ci/browser $(ROWS)

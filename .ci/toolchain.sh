@@ -26,6 +26,7 @@ libraries=(
   ansi-terminal:libghc-ansi-terminal-dev
   async:libghc-async-dev
   base64-bytestring:libghc-base64-bytestring-dev
+  clock:libghc-clock-dev
   file-embed:libghc-file-embed-dev
   HsOpenSSL:libghc-hsopenssl-dev
   hspec:libghc-hspec-dev
@@ -33,11 +34,13 @@ libraries=(
   HUnit:libghc-hunit-dev
   network:libghc-network-dev
   optparse-applicative:libghc-optparse-applicative-dev
+  postgresql-simple:libghc-postgresql-simple-dev
   QuickCheck:libghc-quickcheck2-dev
   scientific:libghc-scientific-dev
   svg-builder:libghc-svg-builder-dev
   terminal-size:libghc-terminal-size-dev
   unliftio-core:libghc-unliftio-core-dev
+  uuid:libghc-uuid-dev
   wai:libghc-wai-dev
   wai-websockets:libghc-wai-websockets-dev
   warp:libghc-warp-dev

@@ -12,6 +12,7 @@ import qualified Behavior.SemaphoreSimSpec
 import qualified Behavior.SpaceSpec
 import qualified Examples.DoorBatterySpec
 import qualified Examples.DroneSpec
+import qualified Examples.FleetMissionSpec
 import qualified Examples.FleetSpec
 import qualified Examples.PatrolSpec
 import qualified Examples.PickAndPlaceSpec
@@ -19,6 +20,10 @@ import qualified Examples.ProgressProblemSpec
 import qualified Examples.RosMissionSpec
 import qualified Examples.TestingARobotSpec
 import qualified Examples.YourOwnMonadSpec
+import qualified Fleet.ModelSpec
+import qualified Fleet.PromisesSpec
+import qualified Fleet.ResourceSpec
+import qualified Fleet.TaskSpec
 import qualified Live.FollowingSpec
 import qualified Live.HistorySpec
 import qualified Live.HubSpec
@@ -41,9 +46,9 @@ main = hspec $ do
   -- (First: it waits for clocks and sockets, while other programs need the processors.)
   describe "The live page" $ do
     Live.HistorySpec.spec
-    describe "Many robots" Live.HubSpec.spec
     Live.ServerSpec.spec
     describe "A trace file" Live.FollowingSpec.spec
+    describe "Many robots" Live.HubSpec.spec
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
   describe "resumable" Behavior.ResumableSimSpec.spec
   describe "withTSem" Behavior.SemaphoreSimSpec.spec
@@ -59,10 +64,16 @@ main = hspec $ do
     Ros.LinkSpec.spec
     Ros.CallSpec.spec
     Ros.MessagesSpec.spec
+  describe "Fleets" $ do
+    Fleet.ModelSpec.spec
+    Fleet.TaskSpec.spec
+    Fleet.ResourceSpec.spec
+    Fleet.PromisesSpec.spec
   describe "Examples" $ do
     describe "door-battery" Examples.DoorBatterySpec.spec
     describe "progress-problem" Examples.ProgressProblemSpec.spec
     describe "ros-mission" Examples.RosMissionSpec.spec
+    describe "fleet-mission" Examples.FleetMissionSpec.spec
     describe "Robots" $ do
       describe "patrol" Examples.PatrolSpec.spec
       describe "pick-and-place" Examples.PickAndPlaceSpec.spec

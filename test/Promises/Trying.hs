@@ -7,6 +7,7 @@ module Promises.Trying
   , underRandom
   , underAll
   , inReality
+  , seedOf
   ) where
 
 import Control.Concurrent (ThreadId, yield)

@@ -1,0 +1,162 @@
+{-# OPTIONS_HADDOCK not-home #-}
+{-# LANGUAGE LambdaCase #-}
+
+-- |
+-- A connection that comes back. One behaviour at a time uses it; one that is interrupted in a statement leaves a
+-- connection that is used no more.
+--
+-- Internal: any of it may change in any release.
+module Behavior.Fleet.Internal.Line
+  ( Line
+  , newLine
+  , isThere
+  , whyAway
+  , isAwayFor
+  , keeping
+  , withSession
+  , asking
+  , posting
+  , answering
+  ) where
+
+import Control.Concurrent.STM hiding (atomically)
+import Control.Exception
+import Control.Monad (forever, join, unless)
+import Data.Maybe (isJust, isNothing)
+
+import Behavior (Behavior, StoppedWithFault (..), sleep, tryAny)
+import Behavior.Fleet.Internal.Database
+import Behavior.Fleet.Internal.Error
+import Behavior.Fleet.Internal.Options
+import Behavior.Parallel (firstOf)
+import Behavior.STM (atomically)
+import Behavior.Time (now)
+
+-- | A connection, whenever there is one.
+data Line = Line
+  { place :: TVar Place
+  , lastWhy :: TVar String
+  , lineOptions :: FleetOptions
+  , asked :: TQueue (Behavior ())
+  -- ^ What callers have asked for, and its answer goes to them.
+  }
+
+-- | Where the connection is.
+data Place
+  = Nowhere
+  | -- | Nowhere, and who asks for it is to have this fault.
+    Refusing SomeException
+  | Free Session
+  | InUse
+  | -- | It must not be used again; and why, if it was lost.
+    Broken (Maybe String)
+
+-- | One that has not connected yet.
+newLine :: FleetOptions -> IO Line
+newLine options = Line <$> newTVarIO Nowhere <*> newTVarIO "it has not connected yet" <*> pure options <*> newTQueueIO
+
+-- | Whether there is a connection.
+isThere :: Line -> STM Bool
+isThere line = (\case Free _ -> True; InUse -> True; _ -> False) <$> readTVar (place line)
+
+-- | Why there is no connection, or was none at last, or why what was asked for was not done.
+whyAway :: Line -> STM String
+whyAway = readTVar . lastWhy
+
+-- | That is why.
+isAwayFor :: Line -> String -> STM ()
+isAwayFor = writeTVar . lastWhy
+
+-- | Connects, and connects again whenever the connection is lost, with growing pauses. The first behaviour prepares a
+-- connection; the second runs beside its use. Says why there is no connection, when that changes, and when there is one
+-- again.
+keeping
+  :: Database -> Line -> (Maybe String -> STM ()) -> (Session -> Behavior ()) -> (Session -> Behavior ()) -> Behavior a
+keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go said (firstPause options)
+ where
+  options = lineOptions line
+  go said pause = do
+    begun <- now
+    ended <- tryAny (opening database (\session -> limited line (prepare session) >> used said session))
+    atomically $ do
+      why <- case ended of
+        Right why -> pure why
+        Left why -> do
+          writeTVar (lastWhy line) (displayException why)
+          writeTVar (place line) (if isFleetFault why then Refusing why else Nowhere)
+          pure (Just (displayException why))
+      before <- readTVar said
+      unless (isNothing why || why == before) (writeTVar said why >> say why)
+    lasted <- subtract begun <$> now
+    sleep pause
+    go said (if lasted > longestPause options then firstPause options else min (longestPause options) (2 * pause))
+  used said session = do
+    atomically $ do
+      writeTVar (place line) (Free session)
+      swapTVar said Nothing >>= mapM_ (\_ -> say Nothing)
+    firstOf [Nothing <$ beside session, atomically (readTVar (place line) >>= \case Broken why -> pure why; _ -> retry)]
+      `finally` uninterruptibleMask_ (atomically leave)
+  -- (A use has a limit of time. A connection must not be closed while it is used.)
+  leave = readTVar (place line) >>= \case
+    InUse -> retry
+    _ -> writeTVar (place line) Nowhere
+  isFleetFault why = isJust (fromException why :: Maybe FleetFault)
+
+-- | Runs a behaviour with the connection, when it is there and free. It has 'answerWithin' for that. Throws
+-- 'ConnectionLost' if the connection is lost meanwhile.
+withSession :: Line -> (Session -> Behavior a) -> Behavior a
+withSession line act = mask $ \restore -> do
+  session <- atomically $ readTVar (place line) >>= \case
+    Free session -> session <$ writeTVar (place line) InUse
+    Refusing fault -> throwSTM fault
+    _ -> retry
+  result <- restore (limited line (act session)) `catch` \why -> do
+    atomically (writeTVar (place line) (Broken (lossIn why)) >> writeTVar (lastWhy line) (displayException why))
+    throwIO (onlyStop why)
+  result <$ atomically (writeTVar (place line) (Free session))
+ where
+  lossIn why = (\(ConnectionLost it) -> it) <$> fromException why
+  -- (A loss that comes while it is stopped is nothing that its caller has to know.)
+  onlyStop why = case fromException why of
+    Just (StoppedWithFault stop fault) | Just (ConnectionLost _) <- fromException fault -> stop
+    _ -> why
+
+-- | 'withSession', by the thread of 'answering'. So a caller that is interrupted (it gives up waiting for a door, say)
+-- interrupts no statement: the connection, which all robots of the process share, is used on. What has not begun then
+-- is not done.
+asking :: Line -> (Session -> Behavior a) -> Behavior a
+asking line act = do
+  isWanted <- newTVarIO True
+  answer <- newTVarIO Nothing
+  let unlessUnwanted session = readTVarIO isWanted >>= \is -> if is then Just <$> act session else pure Nothing
+  atomically . writeTQueue (asked line) $
+    tryAny (withSession line unlessUnwanted) >>= atomically . writeTVar answer . either (Just . Left) (fmap Right)
+  atomically (readTVar answer >>= maybe retry pure) `onException` atomically (writeTVar isWanted False)
+    >>= either throwIO pure
+
+-- | The same, but it is done also when its caller does not wait for it any more. If the connection is lost meanwhile,
+-- or the behaviour gives that it is not done, it is tried again, as often as twenty times: each time after all else
+-- that was asked for. Gives whether it is over.
+posting :: Line -> (Session -> Behavior Bool) -> Behavior (STM Bool)
+posting line act = do
+  isOver <- newTVarIO False
+  let go :: Int -> Behavior ()
+      go times = do
+        ended <- tryAny (withSession line act)
+        let again = times > 1 && either isLoss not ended
+        atomically (if again then writeTQueue (asked line) (go (times - 1)) else writeTVar isOver True)
+  readTVar isOver <$ atomically (writeTQueue (asked line) (go 20))
+ where
+  isLoss why = isJust (fromException why :: Maybe ConnectionLost)
+
+-- | Does what was asked for, one after the other.
+answering :: Line -> Behavior a
+answering line = forever (join (atomically (readTQueue (asked line))))
+
+-- (A failure of the behaviour is its own, also one of a limit of time.)
+limited :: Line -> Behavior a -> Behavior a
+limited line act =
+  firstOf [Just <$> act, Nothing <$ sleep seconds]
+    >>= maybe (throwIO (ConnectionLost ("no answer within " ++ show seconds ++ " s"))) pure
+ where
+  seconds = answerWithin (lineOptions line)

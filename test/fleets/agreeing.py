@@ -1,0 +1,34 @@
+"""Row 7 of make fleets: what the fake database does is what PostgreSQL does; and days of a fleet on it, simulated."""
+
+import os
+import re
+import subprocess
+
+from claims import claim
+from fleet import BUILT, SEED, another_server, psql, server
+
+LONG = "LONG" in os.environ
+
+
+def row_7():
+    folder = another_server("agreed")
+    psql("create database fleet owner owner", user="postgres", database="postgres", host=folder)
+    owner, robot = (f"host={folder} dbname=fleet user={user}" for user in ("owner", "robot"))
+    subprocess.run([f"{BUILT}/behavior-fleet", "create", owner], check=True, stdout=subprocess.DEVNULL)
+    psql("create role robot login in role fleet_robot", host=folder)
+    wanted = 5000 if LONG else 300
+    said = run("agree", owner, robot, str(SEED), str(wanted))
+    tried = re.search(r"OK, passed (\d+) tests", said)
+    claim(7, "sequences of requests to PostgreSQL and to the fake database, which agree",
+          tried[1] if tried else said, wanted, bool(tried) and int(tried[1]) == wanted)
+    server("-m", "immediate", "stop", data="agreed/data")
+    wanted = 100000 if LONG else 1000
+    said = run("days", str(SEED), str(wanted))
+    tried = re.search(r"(\d+) schedules, (\d+) scheduling points", said)
+    claim(7, "schedules of days of a fleet, in which nothing is broken", tried[0] if tried else said, wanted,
+          bool(tried) and int(tried[1]) >= wanted)
+
+
+def run(*arguments):
+    done = subprocess.run([f"{BUILT}/fleets", *arguments], text=True, capture_output=True, check=False)
+    return done.stdout.strip() if done.returncode == 0 else f"{done.stdout[-2000:]} {done.stderr[-2000:]}"

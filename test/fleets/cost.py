@@ -1,0 +1,127 @@
+"""Rows 4, 5 and 6: what fleets cost."""
+
+import os
+import statistics
+import subprocess
+import time
+
+import psycopg2
+
+from claims import claim
+from fleet import ADDRESS, BUILT, FOLDER, Robot, fresh, kill_all, number, psql, until
+from processes import cpu, family, postmaster
+
+SECONDS = 15
+
+
+def row_4():
+    """A thousand robots that wait for tasks, in twenty processes."""
+    fresh()
+    robots = [Robot("idle", f"idle-{n}", 50) for n in range(20)]
+    seen = "select count(*) from fleet.process where cardinality(robots) >= 50"
+    until(lambda: number(seen) == 20, 60, "all processes", step=0.5)
+    time.sleep(5)
+    theirs, servers = [robot.process.pid for robot in robots], family(postmaster())
+    before, begun = (cpu(theirs), cpu(servers)), time.monotonic()
+    time.sleep(SECONDS)
+    used = [(now - then) / (time.monotonic() - begun) * 100 for now, then in zip((cpu(theirs), cpu(servers)), before)]
+    with Robot("submit", "office", 1, 20, 0) as office:
+        until(lambda: office.says("submitted"), 30, "the orders' submission")
+        until(lambda: number("select count(*) from delivered") == 20, 10, "their delivery")
+    kill_all(robots)
+    for whose, share, limit in (("the database takes", used[1], 1), ("all robots take", used[0], 5)):
+        claim(4, f"1,000 idle robots in 20 processes: of a core, {whose}", f"{share:.2f} %", f"under {limit} %",
+              share < limit)
+
+
+ROUNDS = int(os.environ.get("ROUNDS") or 3)
+TASKS = {1: 600, 4: 2000, 16: 4000}
+
+
+def row_5():
+    """Empty tasks, beside graphile-worker, in turn."""
+    psql("create schema if not exists graphile_worker")
+    graphile(1, 0)
+    for workers, count in TASKS.items():
+        ours, theirs = [], []
+        for _ in range(ROUNDS):
+            fresh()
+            psql(f"select count(fleet.submit('empty', n::text, '[]')) from generate_series(1, {count}) n")
+            psql("vacuum analyze fleet.task")
+            with Robot("drain", "drain", workers, count) as robot:
+                ours.append(float(until(lambda: robot.says("drained"), 120, "the last task")[0][2]))
+            done = number("select count(*) from fleet.task where state = 'done'")
+            psql(f"select count(graphile_worker.add_job('empty', '[]')) from generate_series(1, {count}) n")
+            psql("vacuum analyze graphile_worker._private_jobs")
+            theirs.append(graphile(workers, count))
+            left = number("select count(*) from graphile_worker.jobs")
+            if (done, left) != (count, 0):
+                claim(5, "tasks that are done, and that graphile-worker has left", [done, left], [count, 0], False)
+        mine, other = (count / statistics.median(times) for times in (ours, theirs))
+        claim(5, f"{workers} workers: empty tasks in a second, graphile-worker's, and the ratio",
+              f"{mine:.0f}, {other:.0f}, {mine / other:.2f}", "at least 1.0", mine >= other)
+
+
+def graphile(workers, count):
+    """How long it took."""
+    done = subprocess.run(["node", "test/fleets/graphile.cjs", FOLDER, str(workers), str(count)], text=True, check=True,
+                          env={**os.environ, "NODE_PATH": f"{BUILT}/node_modules"}, capture_output=True, timeout=120)
+    return float(done.stdout or 0)
+
+
+KEPT = """
+insert into fleet.task (queue, key, state, priority, needs, input, due, pauses, kept, starts, lease, robot, term, wakes,
+  result, submitted, ended)
+select 'orders', '{key} ' || n, 'done', 0, '{{}}', jsonb_build_array(n, 0), at, '{{1s,10s,1min,10min}}', '7 days', 1, n,
+  'robot-' || n % 100, '10 s', at + interval '7 days', 'null', at, at + interval '1 s'
+from generate_series(1, {count}) n, clock_timestamp() at
+"""
+CLAIMS = 200
+
+
+def row_6():
+    """A million tasks that are done."""
+    fresh()
+    psql(KEPT.format(key="old", count=1000))
+    few = claims("few")
+    psql(KEPT.format(key="older", count=1_000_000))
+    many = claims("many")
+    psql("vacuum analyze fleet.task")
+    known = claims("known")
+    # As if they had been kept for less: in each second the time of a thousand has come; then that of many at once.
+    passing = """
+      update fleet.task set wakes = clock_timestamp() + n * interval '{}' from (
+        select task, row_number() over () n from fleet.task where key like 'older %' limit {}) t
+      where t.task = fleet.task.task
+    """
+    psql(passing.format("1 ms", 20_000))
+    going = claims("going")
+    for name, it in [("a million", many), ("a million, vacuumed", known), ("a thousand to go each second", going)]:
+        claim(6, f"a claim, without its commit, with a thousand finished tasks, and with {name}",
+              f"{few * 1000:.2f} ms, {it * 1000:.2f} ms: {it / few:.2f} times", "at most 1.5 times", it <= 1.5 * few)
+    psql(passing.format("0 s", 100_000))
+    print(f"row 6: a claim when the time of a hundred thousand has come: {claims('all') * 1000:.2f} ms", flush=True)
+    count, begun = number("select count(*) from fleet.task"), time.monotonic()
+    with Robot("idle", "idle", 1):
+        time.sleep(6)
+    took = time.monotonic() - begun
+    gone = count - number("select count(*) from fleet.task")
+    claim(6, "then one idle process forgets in a second", f"{gone / took:.0f}", "100 or more", gone / took >= 100)
+
+
+def claims(name):
+    """The median of the seconds that one claim takes."""
+    psql(f"select count(fleet.submit('orders', '{name} ' || n, '[1, 0]')) from generate_series(1, {CLAIMS}) n")
+    psql("checkpoint", user="postgres")  # (What was written before is no cost of these.)
+    times = []
+    connection = psycopg2.connect(ADDRESS)
+    with connection.cursor() as cursor:
+        for _ in range(CLAIMS):
+            cursor.execute("select")  # (It begins the transaction.)
+            begun = time.monotonic()
+            cursor.execute("select task, lease from fleet.claim('orders', '{robot}', '{}', '10 s')")
+            times.append(time.monotonic() - begun)
+            cursor.execute("select fleet.complete(%s, %s, 'null')", cursor.fetchone())
+            connection.commit()
+    connection.close()
+    return statistics.median(times)

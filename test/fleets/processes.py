@@ -1,0 +1,35 @@
+"""Processes, as the system sees them."""
+
+import os
+import signal
+
+from fleet import FOLDER, until
+
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def postmaster(data="data"):
+    """The server's first process."""
+    with open(f"{FOLDER}/{data}/postmaster.pid", encoding="utf-8") as file:
+        return int(file.readline())
+
+
+def family(process):
+    """The process, and those that it has started."""
+    with open(f"/proc/{process}/task/{process}/children", encoding="utf-8") as children:
+        return [process, *map(int, children.read().split())]
+
+
+def end(processes):
+    """Kills them: a server has not even the time for its socket."""
+    for process in processes:
+        os.kill(process, signal.SIGKILL)
+    until(lambda: not any(os.path.exists(f"/proc/{process}") for process in processes), 10, "their end")
+
+
+def cpu(processes):
+    """How many seconds they have worked, and those that they have started and that have ended."""
+    def worked(process):
+        with open(f"/proc/{process}/stat", encoding="utf-8") as file:
+            return sum(map(int, file.read().rsplit(")", 1)[1].split()[11:15])) / TICKS
+    return sum(worked(process) for process in processes if os.path.exists(f"/proc/{process}"))
