@@ -360,6 +360,7 @@ declare
   kind text[];
   t fleet.task;
 begin
+  if cardinality(kinds) = 0 then return; end if;
   foreach a_robot in array some_robots loop
     loop
       t := null;
@@ -421,7 +422,9 @@ begin
   end if;
   return query select * from fleet.claim_waiting(a_queue, some_robots, skills, a_term, a_request);
   get diagnostics served = row_count;
-  if served < cardinality(some_robots) and (select swept from fleet.sweep()) > 0 then
+  if served < cardinality(some_robots) and exists (
+      select from fleet.task where wakes <= fleet.clock() and state in ('later', 'waiting', 'running'))
+      and (select swept from fleet.sweep()) > 0 then
     return query select * from fleet.claim_waiting(a_queue, some_robots[served + 1:], skills, a_term, a_request);
   end if;
 end $$;

@@ -11,7 +11,7 @@ from claims import claim
 from fleet import ADDRESS, BUILT, FOLDER, Robot, fresh, kill_all, number, psql, until
 from processes import cpu, family, postmaster
 
-SECONDS = 15
+SECONDS = 20
 
 
 def row_4():
@@ -110,7 +110,11 @@ def row_6():
 
 
 def claims(name):
-    """The median of the seconds that one claim takes."""
+    """The median of the seconds that one claim takes: the least of five, for what else the machine does only adds."""
+    return min(claims_once(f"{name} {n}") for n in range(5))
+
+
+def claims_once(name):
     psql(f"select count(fleet.submit('orders', '{name} ' || n, '[1, 0]')) from generate_series(1, {CLAIMS}) n")
     psql("checkpoint", user="postgres")  # (What was written before is no cost of these.)
     times = []

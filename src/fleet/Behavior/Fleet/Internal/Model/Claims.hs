@@ -34,7 +34,9 @@ claim at it = do
     served <- claimWaiting at it
     case drop (length served) (forRobots it) of
       [] -> pure served
-      others -> (served ++) <$> (sweep at >> claimWaiting at it {forRobots = others})
+      others -> do
+        isDue <- getting (any (\row -> isOpen row && maybe False (<= at) (wakes row)) . Map.elems . rows)
+        if isDue then (served ++) <$> (sweep at >> claimWaiting at it {forRobots = others}) else pure served
 
 -- | What was started by this request, and runs: from now for its term.
 startsOf :: Seconds -> UUID -> Doing [Start]
