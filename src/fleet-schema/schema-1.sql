@@ -307,7 +307,8 @@ end $$;
 
 -- Does what the clock has made due, 100 tasks at a time: for how many, and the seconds until the next one is due. (A
 -- task with which that is not possible is dead, and keeps no other from its turn.)
-create function fleet.sweep(out swept int, out next_in double precision) language plpgsql as $$
+create function fleet.sweep(out swept int, out next_in double precision)
+language plpgsql set lock_timeout = '250ms' as $$
 declare
   at timestamptz := fleet.clock();
   removed int;

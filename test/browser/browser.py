@@ -6,6 +6,7 @@ from selenium import webdriver
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
+from claims import claim
 from robot import FOLDER, until
 
 # What a tab notes of itself: values of the clock and when they came (both in milliseconds of POSIX), and its frames.
@@ -103,6 +104,18 @@ class Browser:
 
     def press(self, keys):
         ActionChains(self.driver).send_keys(keys).perform()
+
+    def accessible(self, row, passes):
+        """For all: axe-core finds no violation on the page (and has more than that number of rules that hold), which is
+        no wider than its window."""
+        with open(FOLDER + "/node_modules/axe-core/axe.min.js", encoding="utf-8") as file:
+            self.driver.execute_script(file.read())
+        found = self.driver.execute_async_script("axe.run().then(arguments[0])")
+        faults = [f"{v['id']} ({len(v['nodes'])}): {v['nodes'][0]['html'][:100]}" for v in found["violations"]]
+        claim(row, f"axe-core, {'dark' if self.dark else 'light'}, {self.width} px: violations", faults, "none",
+              not faults and len(found["passes"]) > passes)
+        wide = self.js("[document.documentElement.scrollWidth, innerWidth]")
+        claim(row, f"{self.width} px: the page's width", wide[0], f"at most {wide[1]}", wide[0] <= wide[1])
 
     def heap(self):
         """The bytes of the page's heap, without what is garbage."""

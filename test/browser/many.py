@@ -161,8 +161,6 @@ def hostile(browser, hub):
 
 def accessible():
     """For all: what axe-core finds, where one robot is live, and another one is not."""
-    with open(FOLDER + "/node_modules/axe-core/axe.min.js") as file:
-        axe = file.read()
     with Robot("work") as live, Robot("work") as away, Hub({"Ann": live.address, "Bob": away.address}) as hub:
         with Browser() as browser:
             browser.open(hub)
@@ -174,11 +172,4 @@ def accessible():
                     browser.open(hub)
                     until(lambda: len(cards(browser)) == 2, 5, "the cards")
                     becomes(browser, "Bob", "disconnected since", 5)
-                    browser.driver.execute_script(axe)
-                    found = browser.driver.execute_async_script("axe.run().then(arguments[0])")
-                    faults = [f"{v['id']} ({len(v['nodes'])}): {v['nodes'][0]['html'][:100]}"
-                              for v in found["violations"]]
-                    claim(14, f"axe-core, {'dark' if dark else 'light'}, {width} px: violations", faults, "none",
-                          not faults and len(found["passes"]) > 15)
-                    wide = browser.js("[document.documentElement.scrollWidth, innerWidth]")
-                    claim(14, f"{width} px: the page's width", wide[0], f"at most {wide[1]}", wide[0] <= wide[1])
+                    browser.accessible(14, 15)

@@ -17,8 +17,6 @@ from robot import FOLDER, Robot, until
 
 def row_10():
     """For all: what axe-core finds, and a keyboard alone."""
-    with open(FOLDER + "/node_modules/axe-core/axe.min.js") as file:
-        axe = file.read()
     with Robot("work") as robot:
         robot.tell("tick 0")
         for order in ("survey", "dock", "inspect"):
@@ -31,14 +29,7 @@ def row_10():
                     until(lambda: "inspect" in browser.tree(), 5, "the order")
                     browser.js("document.querySelector('details').open = true")
                     browser.find("#tree button").click()
-                    browser.driver.execute_script(axe)
-                    found = browser.driver.execute_async_script("axe.run().then(arguments[0])")
-                    faults = [f"{v['id']} ({len(v['nodes'])}): {v['nodes'][0]['html'][:100]}"
-                              for v in found["violations"]]
-                    claim(10, f"axe-core, {'dark' if dark else 'light'}, {width} px: violations", faults, "none",
-                          not faults and len(found["passes"]) > 20)
-                    wide = browser.js("[document.documentElement.scrollWidth, innerWidth]")
-                    claim(10, f"{width} px: the page's width", wide[0], f"at most {wide[1]}", wide[0] <= wide[1])
+                    browser.accessible(10, 20)
         with Browser() as browser:
             browser.open(robot)
             until(lambda: "inspect" in browser.tree(), 5, "the order")

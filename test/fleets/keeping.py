@@ -32,11 +32,7 @@ PARTS = """
 
 
 def psql(text, user="owner", database="fleet"):
-    command = ["psql", "-XqAt", "-v", "ON_ERROR_STOP=1", "-h", folder, "-U", user, "-d", database, "-f", "-"]
-    done = subprocess.run(command, input=text, text=True, capture_output=True, check=False)
-    if done.returncode:
-        raise RuntimeError(done.stderr)
-    return done.stdout.strip()
+    return fleet.psql(text, user, database, folder)
 
 
 def refused(text, user, database="fleet"):

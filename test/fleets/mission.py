@@ -4,14 +4,14 @@ the database is killed. Prints what happens, and in the end a table. It is judge
 mission.py   (with FLEET, the folder of the server and its socket, and BUILT, that of the programs)
 """
 
-import os
 import random
 import signal
 import subprocess
 import sys
 import time
 
-folder, built = os.environ["FLEET"], os.environ["BUILT"]
+from fleet import BUILT, FOLDER, SEED, psql, server
+
 ORDERS, ROBOTS, POISON = 500, 20, 13
 TERM = 2  # seconds, after which an order is started again when its robot is gone
 KILLS, FREEZES, AWAY = 10, 5, 5
@@ -19,21 +19,10 @@ LIMIT = 180
 processes, killed, frozen, fallen, crashes = {}, [], [], [], []
 
 
-def psql(text):
-    done = subprocess.run(["psql", "-XqAt", "-h", folder, "-U", "owner", "-d", "fleet", "-c", text], text=True,
-                          capture_output=True, check=True)
-    return done.stdout.strip()
-
-
-def server(*arguments):
-    subprocess.run(["runuser", "-u", "postgres", "--", os.environ["bin"] + "/pg_ctl", "-D", f"{folder}/data", "-w",
-                    "-l", f"{folder}/server.log", *arguments], check=True, stdout=subprocess.DEVNULL)
-
-
 def start(name, *arguments):
-    with open(f"{folder}/{name}.log", "a", encoding="utf-8") as log:
+    with open(f"{FOLDER}/{name}.log", "a", encoding="utf-8") as log:
         processes[name] = subprocess.Popen(
-            [f"{built}/fleet-mission", *arguments, "--database", f"host={folder} dbname=fleet user=robot",
+            [f"{BUILT}/fleet-mission", *arguments, "--database", f"host={FOLDER} dbname=fleet user=robot",
              "--term", str(TERM)], stdout=log, stderr=log)
 
 
@@ -51,16 +40,16 @@ def start_robot(n):
 
 
 def show_page():
-    with open(f"{folder}/hub.log", "w", encoding="utf-8") as log:
+    with open(f"{FOLDER}/hub.log", "w", encoding="utf-8") as log:
         processes["hub"] = subprocess.Popen(
-            [f"{built}/behavior-fleet", "hub", f"host={folder} dbname=fleet user=viewer"], stdout=log, stderr=log)
+            [f"{BUILT}/behavior-fleet", "hub", f"host={FOLDER} dbname=fleet user=viewer"], stdout=log, stderr=log)
     while "http://" not in (said := log_of("hub")) and processes["hub"].poll() is None:
         time.sleep(0.05)
     print(said.strip(), flush=True)
 
 
 def log_of(name):
-    with open(f"{folder}/{name}.log", encoding="utf-8") as log:
+    with open(f"{FOLDER}/{name}.log", encoding="utf-8") as log:
         return log.read()
 
 
@@ -138,7 +127,7 @@ def main():
 def count_delivered():
     try:
         return psql("select count(*) from delivered") + " delivered"
-    except subprocess.CalledProcessError:
+    except RuntimeError:
         return "the database is away"
 
 
@@ -169,9 +158,8 @@ def judge(took):
     return all(ok is not False for _, _, ok in rows)
 
 
-seed = int(os.environ.get("SEED", time.time_ns() % 100000))
-print(f"SEED={seed}", flush=True)
-random.seed(seed)
+print(f"SEED={SEED}", flush=True)
+random.seed(SEED)
 right = judge(main())
 print("\nThe office says:")
 print(log_of("office"))

@@ -94,7 +94,7 @@ type Seekers = ((Text, Set Text), Group, [Seeker])
 completeAndClaim :: Fleet -> [Completion] -> Seekers -> Behavior ()
 completeAndClaim fleet ready these@(_, group, waiting) = do
   wanted <- claiming fleet these
-  answer <- asking fleet (CompleteAndClaim (map completion ready) wanted)
+  answer <- answerTo fleet (CompleteAndClaim (map completion ready) wanted)
   case answer of
     -- (It may be a result that is refused, and then nothing was done.)
     Left _ -> do
@@ -105,7 +105,7 @@ completeAndClaim fleet ready these@(_, group, waiting) = do
       areStarted fleet these (Right (asked, started))
 
 claim :: Fleet -> Seekers -> Behavior ()
-claim fleet these = claiming fleet these >>= asking fleet . Claim >>= areStarted fleet these
+claim fleet these = claiming fleet these >>= answerTo fleet . Claim >>= areStarted fleet these
 
 claiming :: Fleet -> Seekers -> Behavior Claiming
 claiming fleet ((name, which), _, waiting) = do
@@ -126,8 +126,8 @@ areStarted fleet (_, group, waiting) answer = do
   for_ unwanted (giveBack fleet)
 
 -- | What the database answers, and when it was asked. It waits for a database that is away.
-asking :: Fleet -> Request r -> Behavior (Either SomeException (Seconds, r))
-asking fleet what = (>>= granted) <$> tryAny (requestPatiently fleet working what)
+answerTo :: Fleet -> Request r -> Behavior (Either SomeException (Seconds, r))
+answerTo fleet what = (>>= granted) <$> tryAny (requestPatiently fleet working what)
  where
   granted (asked, given) = either (Left . refusedAs) (Right . (,) asked) given
 
@@ -164,7 +164,7 @@ completed fleet next task lease gave = do
 
 complete :: Fleet -> [Completion] -> Behavior ()
 complete fleet ready =
-  asking fleet (Complete (map completion ready)) >>= \case
+  answerTo fleet (Complete (map completion ready)) >>= \case
     -- (It is the result of one of them that is refused.)
     Left _ | _ : _ : _ <- ready -> mapM_ (complete fleet . pure) ready
     Left why -> atomically (for_ ready (\it -> writeTVar (isCompleted it) (Just (Left why))))

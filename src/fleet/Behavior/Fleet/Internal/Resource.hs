@@ -87,9 +87,9 @@ isLeaseLost fault = case fault of
 -- hold is renewed at each third of it. The behaviour is interrupted when two thirds have passed since the last renewal
 -- was /asked for/, by this machine's own clock, which goes on while it is suspended.
 --
--- So no other robot holds the resource meanwhile, /if/ this process runs, stopping the behaviour takes less than a
--- third of the term, and the database's clock steps by less than that. Otherwise only the fence protects, and a
--- resource that checks no fence is unprotected.
+-- So no other robot holds the resource meanwhile, /if/ this process runs, and stopping the behaviour and a step of the
+-- database's clock take together less than a third of the term. Otherwise only the fence protects, and a resource that
+-- checks no fence is unprotected.
 --
 -- [Result] The behaviour's.
 -- [Failure] The behaviour's. 'NotAllowed', if the name or the term is not allowed. 'NoDatabase', while it waits.
