@@ -5,7 +5,7 @@ import re
 import subprocess
 
 from claims import claim
-from fleet import BUILT, SEED, another_server, psql, server
+from fleet import BUILT, SEED, address, another_server, psql, server
 
 LONG = "LONG" in os.environ
 
@@ -13,7 +13,7 @@ LONG = "LONG" in os.environ
 def row_7():
     folder = another_server("agreed")
     psql("create database fleet owner owner", user="postgres", database="postgres", host=folder)
-    owner, robot = (f"host={folder} dbname=fleet user={user}" for user in ("owner", "robot"))
+    owner, robot = (address(user=user, host=folder) for user in ("owner", "robot"))
     subprocess.run([f"{BUILT}/behavior-fleet", "create", owner], check=True, stdout=subprocess.DEVNULL)
     psql("create role robot login in role fleet_robot", host=folder)
     wanted = 5000 if LONG else 300

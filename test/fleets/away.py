@@ -6,7 +6,7 @@ import signal
 import time
 
 from claims import claim
-from fleet import ADDRESS, FOLDER, Robot, as_server, fresh, kill_all, number, psql, server, until
+from fleet import FOLDER, Robot, address, as_server, fresh, kill_all, number, psql, server, until
 from processes import end, family, postmaster
 
 OUTAGE, GOES_ON, TERM = 30, 5, 3
@@ -87,11 +87,11 @@ def standing_by(primary, standby, host, other, how):
     sync = "select count(*) from pg_stat_replication where sync_state = 'sync'"
     until(lambda: number(sync, user="postgres", host=host) == 1, 30, "the standby")
 
-    address = ADDRESS.replace(FOLDER, f"{host},{other}") + " target_session_attrs=read-write"
-    robots = [Robot("robot", f"robot-{n}", TERM, address=address) for n in range(4)]
+    both = address(host=f"{host},{other}") + " target_session_attrs=read-write"
+    robots = [Robot("robot", f"robot-{n}", TERM, database=both) for n in range(4)]
     # (There are orders left when the last robot goes on.)
     count = 320 if how == "frozen" else 160
-    office = Robot("office", "office", 1, count, 0.1, address=address)
+    office = Robot("office", "office", 1, count, 0.1, database=both)
     until(lambda: len(office.says("done")) >= 40, 30, "orders that are done")
     processes = family(postmaster(primary))
     for process in processes:

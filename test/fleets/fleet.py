@@ -10,7 +10,11 @@ import time
 
 FOLDER, BUILT, BIN = os.environ["FLEET"], os.environ["BUILT"], os.environ["bin"]
 SEED = int(os.environ.get("SEED") or random.randrange(10**6))
-ADDRESS = f"host={FOLDER} dbname=fleet user=robot"
+
+
+def address(database="fleet", user="robot", host=FOLDER):
+    return f"host={host} dbname={database} user={user}"
+
 
 # A clock of the database's owner: it runs at a rate, and steps.
 CLOCK = """
@@ -96,10 +100,10 @@ running = set()
 class Robot:
     """A process with one robot or several: of test/Fleets.hs, or robot.py. What it says is in a file of its own."""
 
-    def __init__(self, mode, name, *arguments, python=False, address=ADDRESS):
+    def __init__(self, mode, name, *arguments, python=False, database=address()):
         self.name, self.said = name, f"{FOLDER}/{name}.said"
         begin = [sys.executable, "test/fleets/robot.py"] if python else [f"{BUILT}/fleets"]
-        self.command = [*begin, f"{address} application_name={name}", mode, name, *map(str, arguments)]
+        self.command = [*begin, f"{database} application_name={name}", mode, name, *map(str, arguments)]
         if os.path.exists(self.said):
             os.remove(self.said)  # of another row
         self.start()

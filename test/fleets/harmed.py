@@ -5,7 +5,7 @@ import os
 import time
 
 from claims import claim
-from fleet import ADDRESS, FOLDER, SEED, Robot, fresh, number, psql, until
+from fleet import FOLDER, SEED, Robot, address, fresh, number, psql, until
 
 COUNT = int(os.environ.get("TIMES") or 10_000)
 OPEN = "state in ('later', 'waiting', 'running')"
@@ -127,7 +127,6 @@ def half_migrated():
         psql(f"create database {name}", user="postgres", database="postgres")
         psql(f"grant all on database {name} to owner", user="postgres", database=name)
         psql(part, database=name)
-        address = ADDRESS.replace("dbname=fleet", f"dbname={name}")
-        with Robot("once", f"once-{name}", address=address) as robot:
+        with Robot("once", f"once-{name}", database=address(name)) as robot:
             said = " ".join(until(lambda: robot.says("once:"), 30, "its answer")[0][2:])
         refused(f"a schema that is there in part ({name})", said, "behavior-fleet")

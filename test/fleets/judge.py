@@ -21,8 +21,8 @@ from fleet import SEED, kill_all, running
 ROWS = {name: row for module in (dying, away, cost, agreeing, harmed, keeping) for name, row in vars(module).items()
         if name.startswith("row_")}
 
-# These have a server of their own, and run beside the third row, which mostly waits.
-BESIDE = {7, 10}
+# These run beside another row, which mostly waits: they have a server of their own, or databases.
+BESIDE = {7: 3, 10: 3, 6: 8}
 
 
 def judged(row):
@@ -38,11 +38,8 @@ def judged(row):
 
 print(f"SEED={SEED}", flush=True)
 chosen = list(map(int, sys.argv[1:]))
-beside = [row for row in chosen if row in BESIDE and 3 in chosen]
 for row in chosen:
-    if row == 3:
+    if BESIDE.get(row) not in chosen:
         with concurrent.futures.ThreadPoolExecutor() as together:
-            list(together.map(judged, [3, *beside]))
-    elif row not in beside:
-        judged(row)
+            list(together.map(judged, [row, *(other for other in chosen if BESIDE.get(other) == row)]))
 end()

@@ -45,7 +45,7 @@ def refused(text, user, database="fleet"):
 
 
 def address(database="fleet", user="owner"):
-    return f"host={folder} dbname={database} user={user}"
+    return fleet.address(database, user, folder)
 
 
 def tool(command, *arguments, database="fleet", user="owner"):

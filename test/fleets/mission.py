@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 
-from fleet import BUILT, FOLDER, SEED, psql, server
+from fleet import BUILT, FOLDER, SEED, address, psql, server
 
 ORDERS, ROBOTS, POISON = 500, 20, 13
 TERM = 2  # seconds, after which an order is started again when its robot is gone
@@ -22,8 +22,7 @@ processes, killed, frozen, fallen, crashes = {}, [], [], [], []
 def start(name, *arguments):
     with open(f"{FOLDER}/{name}.log", "a", encoding="utf-8") as log:
         processes[name] = subprocess.Popen(
-            [f"{BUILT}/fleet-mission", *arguments, "--database", f"host={FOLDER} dbname=fleet user=robot",
-             "--term", str(TERM)], stdout=log, stderr=log)
+            [f"{BUILT}/fleet-mission", *arguments, "--database", address(), "--term", str(TERM)], stdout=log, stderr=log)
 
 
 def start_office():
@@ -42,7 +41,7 @@ def start_robot(n):
 def show_page():
     with open(f"{FOLDER}/hub.log", "w", encoding="utf-8") as log:
         processes["hub"] = subprocess.Popen(
-            [f"{BUILT}/behavior-fleet", "hub", f"host={FOLDER} dbname=fleet user=viewer"], stdout=log, stderr=log)
+            [f"{BUILT}/behavior-fleet", "hub", address(user="viewer")], stdout=log, stderr=log)
     while "http://" not in (said := log_of("hub")) and processes["hub"].poll() is None:
         time.sleep(0.05)
     print(said.strip(), flush=True)
