@@ -165,7 +165,8 @@ run_cabal() {
   mkdir -p $dir/packages
   printf '%s\n' 'repository empty' "  url: $url" 'active-repositories: :none' \
     'jobs: $ncpus' 'shared: False' 'executable-dynamic: False' \
-    'program-default-options' '  ghc-options: -j2 +RTS -A64m -n2m -RTS' >$dir/config
+    'program-default-options' '  ghc-options: -j2 +RTS -A64m -n2m -RTS' >$dir/config.$BASHPID
+  mv $dir/config.$BASHPID $dir/config # (Another one may read it.)
   env -u CABAL_CONFIG CABAL_DIR="$PWD/$dir" cabal "$@"
 }
 

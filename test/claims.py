@@ -1,8 +1,10 @@
 """A line for each claim of a test that judges by the record of another process, and whether any has failed."""
 
+import statistics
 import sys
+import time
 
-failed = 0
+failed = missed = 0
 
 
 def claim(row, what, figure, limit, holds):
@@ -11,8 +13,15 @@ def claim(row, what, figure, limit, holds):
     print(f"row {row}: {what}: {figure} ({limit}): {'ok' if holds else 'FAILED'}", flush=True)
 
 
+def timed(row, what, figure, limit, holds):
+    """A claim about time or work. One that does not hold fails on a quiet machine only: see end."""
+    global missed
+    missed += not holds
+    print(f"row {row}: {what}: {figure} ({limit}): {'ok' if holds else 'MISSED'}", flush=True)
+
+
 def at_most(row, what, seconds, limit):
-    claim(row, what, f"{seconds * 1000:.1f} ms", f"at most {limit * 1000:.0f} ms", seconds <= limit)
+    timed(row, what, f"{seconds * 1000:.1f} ms", f"at most {limit * 1000:.0f} ms", seconds <= limit)
 
 
 def all_of(row, what, good, every, least=1):
@@ -25,5 +34,25 @@ def percentile(numbers, share):
     return numbers[min(len(numbers) - 1, int(share * len(numbers)))]
 
 
+def unevenness():
+    """How many times its least time the same work takes, of the processor's time; nothing of ours runs beside it. It is
+    near 1 on a machine whose processors are not shared with other machines."""
+    times, ends = [], time.monotonic() + 5
+    while time.monotonic() < ends:
+        begun, n = time.thread_time(), 0
+        for i in range(3000):
+            n += i
+        times.append(time.thread_time() - begun)
+    return statistics.median(times) / min(times)
+
+
 def end():
-    sys.exit(1 if failed else 0)
+    """Says whether all went well. If claims about time do not hold it looks at the machine first."""
+    uneven = unevenness() if missed else 1
+    if uneven > 1.3:
+        print(f"not judged: {missed} claims about time, for this machine is shared: the same work takes {uneven:.1f} "
+              "times its least time", flush=True)
+    elif missed:
+        print(f"FAILED: {missed} claims about time, on a quiet machine (the same work takes {uneven:.1f} times its "
+              "least time)", flush=True)
+    sys.exit(1 if failed or missed and uneven <= 1.3 else 0)

@@ -22,7 +22,8 @@ processes, killed, frozen, fallen, crashes = {}, [], [], [], []
 def start(name, *arguments):
     with open(f"{FOLDER}/{name}.log", "a", encoding="utf-8") as log:
         processes[name] = subprocess.Popen(
-            [f"{BUILT}/fleet-mission", *arguments, "--database", address(), "--term", str(TERM)], stdout=log, stderr=log)
+            [f"{BUILT}/fleet-mission", *arguments, "--database", address(), "--term", str(TERM)],
+            stdout=log, stderr=log)
 
 
 def start_office():
