@@ -1,6 +1,6 @@
 """A door: it has a record of its own, and refuses a robot whose fence is smaller than one it has seen.
 
-door.py SOCKET RECORD
+door.py SOCKET RECORD   (the socket has that name when the door listens)
 """
 
 import os
@@ -31,11 +31,10 @@ def serve(client):
             pass  # it was killed
 
 
-if os.path.exists(path):
-    os.remove(path)
 server = socket.socket(socket.AF_UNIX)
-server.bind(path)
-os.chmod(path, 0o777)
+server.bind(f"{path}.new")
+os.chmod(f"{path}.new", 0o777)
 server.listen(64)
+os.rename(f"{path}.new", path)
 while True:
     threading.Thread(target=serve, args=(server.accept()[0],), daemon=True).start()
