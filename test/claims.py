@@ -5,6 +5,7 @@ import sys
 import time
 
 failed = missed = 0
+looks = []  # of each look at the machine: the least time of the same work, and the median
 
 
 def claim(row, what, figure, limit, holds):
@@ -34,25 +35,30 @@ def percentile(numbers, share):
     return numbers[min(len(numbers) - 1, int(share * len(numbers)))]
 
 
-def unevenness():
-    """How many times its least time the same work takes, of the processor's time; nothing of ours runs beside it. It is
-    near 1 on a machine whose processors are not shared with other machines."""
-    times, ends = [], time.monotonic() + 5
+def look():
+    """Looks for some seconds at the machine, while nothing of ours runs: how much of the processor's time the same work
+    takes."""
+    times, ends = [], time.monotonic() + 10
     while time.monotonic() < ends:
         begun, n = time.thread_time(), 0
         for i in range(3000):
             n += i
         times.append(time.thread_time() - begun)
-    return statistics.median(times) / min(times)
+    looks.append((min(times), statistics.median(times)))
 
 
 def end():
-    """Says whether all went well. If claims about time do not hold it looks at the machine first."""
-    uneven = unevenness() if missed else 1
+    """Says whether all went well. If claims about time do not hold it looks at the machine first: the same work takes
+    about its least time, unless others use the same processors."""
+    if not missed:
+        sys.exit(failed > 0)
+    look()
+    leasts, medians = zip(*looks)
+    uneven = max(medians) / min(leasts)
     if uneven > 1.3:
         print(f"not judged: {missed} claims about time, for this machine is shared: the same work takes {uneven:.1f} "
               "times its least time", flush=True)
-    elif missed:
-        print(f"FAILED: {missed} claims about time, on a quiet machine (the same work takes {uneven:.1f} times its "
-              "least time)", flush=True)
-    sys.exit(1 if failed or missed and uneven <= 1.3 else 0)
+    else:
+        print(f"FAILED: {missed} claims about time, on a quiet machine: the same work takes {uneven:.1f} times its "
+              "least time", flush=True)
+    sys.exit(failed > 0 or uneven <= 1.3)
