@@ -13,12 +13,11 @@ import harmed
 import many
 import shown
 import used
-from claims import claim, end, look
+from claims import claim, end
 
 MODULES = (shown, harmed, used, many)
 ROWS = {name: row for module in MODULES for name, row in vars(module).items() if name.startswith("row_")}
 
-look()
 for row in map(int, sys.argv[1:]):
     begun = time.monotonic()
     try:

@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 
-from claims import claim, timed
+from claims import claim
 from fleet import CLOCK, FOLDER, SEED, TRUE_CLOCK, Robot, fresh, kill_all, number, psql, server, until
 
 TERM = 1
@@ -70,7 +70,7 @@ def carried(row, orders, kills, freezes, is_python):
     claim(row, "orders with two deliveries", twice, 0, twice == 0)
     claim(row, "starts that a blow has ended", starts - orders, f"{(kills + freezes) // 2} or more",
           starts - orders >= (kills + freezes) // 2)
-    timed(row, "took", f"{took:.1f} s", "under 60 s", took < 60)
+    claim(row, "took", f"{took:.1f} s", "under 60 s", took < 60)
     for kind in ("Haskell", "Python"):
         names = [f"'{r.name}'" for n, r in enumerate(robots) if is_python(n) == (kind == "Python")]
         if names and len(names) < len(robots):
@@ -138,7 +138,7 @@ def passed(row, is_python, doors, times):
         for name, its, rate, step in phases:
             psql(f"update clock set since = clock_timestamp(), rate = {rate}, step = 0")
             phase = Phase(doors, robots, its, step)
-            blows += [kind for door in doors for kind, _, _ in phase.blows[door]]
+            blows += [kind for door in doors for kind, _, _, is_hit in phase.blows[door] if is_hit]
             judge_phase(row, name, phase, is_timed=(rate, step) == (1, 0), is_frozen="freeze" in its)
     finally:
         everyone = [robot for its in robots.values() for robot in its.values()]
@@ -155,8 +155,8 @@ def passed(row, is_python, doors, times):
 
 
 class Phase:
-    """Blows to the robots that are inside: of each its kind, when it came, and to which robot, are in blows; the lines
-    of the doors' records in lines."""
+    """Blows to the robots that are inside: of each its kind, when it came, to which robot, and whether that was inside
+    then, are in blows; the lines of the doors' records in lines."""
 
     def __init__(self, doors, robots, blows, step):
         self.is_over = False
@@ -188,22 +188,21 @@ class Phase:
         while events:
             # At once, or later: most stay for a moment, some for longer than the term.
             least = 0.05 if events[-1] == "cut" else chance.choice([0, 0, 0, 0.3])
-            last = door.inside()
-
-            def another():
-                name, since = door.inside()
-                return name and (name, since) != last and time.monotonic() - since >= least and (name, since)
-
-            name, since = until(another, 60, "a robot that passes", step=0.005)
-            if self.struck(events[-1], door, robots[name], since):
+            last, since = door.inside()
+            wanted = lambda: door.inside() != (last, since) and door.inside()[0] and \
+                time.monotonic() - door.inside()[1] >= least
+            until(wanted, 60, "a robot that passes", step=0.002)
+            name, since = door.inside()
+            if name and self.struck(events[-1], door, robots[name], since):
                 events.pop()
 
     def struck(self, kind, door, robot, since):
-        """Whether it was still inside then: otherwise it goes on at once, and that was no blow. (So that a robot that
-        is killed was not one that waits again already: its turn would be passed over after half a second.)"""
+        """Whether it was still inside then."""
         at = time.monotonic()
         backends = []
-        if kind in ("kill", "freeze"):
+        if kind == "kill":
+            robot.kill()
+        elif kind == "freeze":
             robot.freeze()
         else:
             backends = psql(f"select pid from pg_stat_activity where application_name = '{robot.name}'").split()
@@ -211,10 +210,8 @@ class Phase:
                 os.kill(backend, signal.SIGSTOP)
         time.sleep(0.005)  # (What was on its way to the door is there.)
         is_hit = door.inside() == (robot.name, since)
-        if is_hit:
-            self.blows[door].append((kind, at, robot.name))
-        if is_hit and kind == "kill":
-            robot.kill()
+        self.blows[door].append((kind, at, robot.name, is_hit))
+        if kind == "kill":
             robot.start()
         else:
             time.sleep(1.3 * TERM if is_hit else 0)
@@ -235,7 +232,7 @@ def judge_phase(row, name, phase, is_timed, is_frozen):
             shared += owners.setdefault(fence, robot) != robot
             if accepted and what == "enter":
                 entered += 1
-                blows = inside and [(kind, when) for kind, when, who in phase.blows[door]
+                blows = inside and [(kind, when) for kind, when, who, _ in phase.blows[door]
                                     if who == inside[0] and inside[1] <= when <= at]
                 if inside and "kill" not in dict(blows) and not is_frozen:
                     overlaps += 1
@@ -245,7 +242,7 @@ def judge_phase(row, name, phase, is_timed, is_frozen):
                 inside = None
         entries = [at for at, what, _, _, accepted in lines if accepted and what == "enter"]
         gaps += [min((at for at in entries if at > when), default=1e9) - when
-                 for kind, when, _ in phase.blows[door] if kind != "cut"]
+                 for kind, when, _, _ in phase.blows[door] if kind != "cut"]
     count = sum(map(len, phase.blows.values()))
     claim(row, f"{name}: passes of the doors", entered, f"more than the {count} blows", entered > count)
     if not is_frozen:
@@ -254,7 +251,7 @@ def judge_phase(row, name, phase, is_timed, is_frozen):
     claim(row, f"{name}: accepted with a stale fence, or with that of another robot", f"{stale}, {shared}", "0, 0",
           stale == shared == 0)
     if is_timed:
-        timed(row, f"{name}: longest until the door is passed again", f"{max(gaps):.2f} s",
+        claim(row, f"{name}: longest until the door is passed again", f"{max(gaps):.2f} s",
               f"at most the term + 0.5 s = {TERM + 0.5} s", max(gaps) <= TERM + 0.5)
     if is_frozen:
         print(f"row {row}: {name}: refused, for their fences are stale: {refused}", flush=True)

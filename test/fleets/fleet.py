@@ -121,6 +121,7 @@ class Robot:
 
     def kill(self):
         running.discard(self)
+        self.process.send_signal(signal.SIGCONT)
         self.process.kill()
         self.process.wait()
         self.process.stdin.close()

@@ -4,7 +4,7 @@ import json
 import os
 import time
 
-from claims import claim, timed
+from claims import claim
 from fleet import FOLDER, SEED, Robot, address, fresh, number, psql, until
 
 COUNT = int(os.environ.get("TIMES") or 10_000)
@@ -86,7 +86,7 @@ def texts():
     # (A notice that is missed would cost the time until the next poll.)
     ends = [float(line[0]) for line in lines if line[1] in ("text", "needs:", "megabyte:")]
     longest = max(after - before for before, after in zip(ends, ends[1:]))
-    timed(8, "hostile: longest of these", f"{longest:.1f} s", "at most 3 s", longest <= 3)
+    claim(8, "hostile: longest of these", f"{longest:.1f} s", "at most 3 s", longest <= 3)
     refused("an empty text", said[f"text {len(GOOD)}:"], "has 1 to 200 characters")
     refused("a text of 201 characters", said[f"text {len(GOOD) + 1}:"], "has 1 to 200 characters")
     refused("a text with U+0000", said[f"text {len(GOOD) + 2}:"], "has no character U+0000")

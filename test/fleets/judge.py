@@ -15,7 +15,7 @@ import cost
 import dying
 import harmed
 import keeping
-from claims import claim, end, look
+from claims import claim, end
 from fleet import SEED, kill_all, running
 
 ROWS = {name: row for module in (dying, away, cost, agreeing, harmed, keeping) for name, row in vars(module).items()
@@ -37,7 +37,6 @@ def judged(row):
 
 
 print(f"SEED={SEED}", flush=True)
-look()
 chosen = list(map(int, sys.argv[1:]))
 for row in chosen:
     if BESIDE.get(row) not in chosen:
