@@ -637,7 +637,8 @@ declare
   at timestamptz;
   free_at timestamptz;
   holds_others boolean;
-  mine fleet.place;
+  is_locked boolean;
+  mine bigint;
   other fleet.place;
 begin
   perform fleet.require_epoch();
@@ -652,43 +653,58 @@ begin
   end if;
   insert into fleet.resource (resource, term, until)
     select name, a_term, holds_from from unnest(names) name, fleet.about order by name on conflict do nothing;
-  perform from fleet.resource where resource = any (names) order by resource for update;
-  at := fleet.clock();
-  if exists (
-      select from fleet.resource where request = a_request and until > at
-      having count(*) > 0 and array_agg(resource order by resource) <> names) then
-    perform fleet.refuse('FL002', 'a request that holds other resources already has another number');
-  end if;
-  if (select bool_and(request is not distinct from a_request and until > at)
-      from fleet.resource where resource = any (names)) then
-    update fleet.resource set until = at + a_term, term = a_term where resource = any (names);
-    resources := names;
-    fences := array(select fence from fleet.resource where resource = any (names) order by resource);
-    return;
-  end if;
-  insert into fleet.place (request, resources, robot, asked, until) values (a_request, names, a_robot, at, at + '10 s')
-    on conflict (request) do update set resources = names, asked = at, until = at + interval '10 s'
-    returning * into mine;
-  select max(until) into free_at from fleet.resource where resource = any (names);
-  if free_at > at then
-    again_in := least(5, extract(epoch from free_at - at));
-    return;
-  end if;
-  holds_others := exists (select from fleet.resource where robot = a_robot and until > at);
-  for other in
-    select * from fleet.place where resources && names and place < mine.place and until > at order by place
-  loop
-    select max(until) into free_at from fleet.resource where resource = any (other.resources);
-    -- (A robot that holds something waits for none that cannot have all now: that one may wait for it, in a circle.)
-    continue when holds_others and free_at > at;
-    if at < greatest(free_at, other.asked) + interval '0.5 s' then
-      again_in := least(0.25, extract(epoch from greatest(free_at, other.asked) + interval '0.5 s' - at));
+  -- First without locks, so that those who wait do not wait for each other; then, for what changes a resource, with.
+  <<looking>>
+  foreach is_locked in array array[false, true] loop
+    if is_locked then perform from fleet.resource where resource = any (names) order by resource for update; end if;
+    at := fleet.clock();
+    if exists (
+        select from fleet.resource where request = a_request and until > at
+        having count(*) > 0 and array_agg(resource order by resource) <> names) then
+      perform fleet.refuse('FL002', 'a request that holds other resources already has another number');
+    end if;
+    if (select bool_and(request is not distinct from a_request and until > at)
+        from fleet.resource where resource = any (names)) then
+      continue when not is_locked;
+      update fleet.resource set until = at + a_term, term = a_term where resource = any (names);
+      resources := names;
+      fences := array(select fence from fleet.resource where resource = any (names) order by resource);
       return;
     end if;
-    -- (Once is enough, until it asks again.)
-    update fleet.place set until = at where place = other.place;
+    select place into mine from fleet.place where request = a_request;
+    select max(until) into free_at from fleet.resource where resource = any (names);
+    if free_at > at then
+      again_in := least(5, extract(epoch from free_at - at));
+      exit;
+    end if;
+    holds_others := exists (select from fleet.resource where robot = a_robot and until > at);
+    for other in
+      select * from fleet.place
+      where resources && names and until > at and (mine is null or place < mine) order by place
+    loop
+      select max(until) into free_at from fleet.resource where resource = any (other.resources);
+      -- (A robot that holds something waits for none that cannot have all now: that one may wait for it, in a circle.)
+      continue when holds_others and free_at > at;
+      if at < greatest(free_at, other.asked) + interval '0.5 s' then
+        again_in := least(0.25, extract(epoch from greatest(free_at, other.asked) + interval '0.5 s' - at));
+        exit looking;
+      end if;
+      continue looking when not is_locked;
+      -- (Once is enough, until it asks again; which it may do just now.)
+      update fleet.place set until = at where place = other.place and asked = other.asked;
+      if not found then
+        again_in := 0.25;
+        exit looking;
+      end if;
+    end loop;
   end loop;
-  delete from fleet.place where place = mine.place;
+  if again_in is not null then
+    insert into fleet.place (request, resources, robot, asked, until)
+      values (a_request, names, a_robot, at, at + interval '10 s')
+      on conflict (request) do update set resources = names, asked = at, until = at + interval '10 s';
+    return;
+  end if;
+  delete from fleet.place where request = a_request;
   update fleet.resource r set
     fence = numbered.fence, request = a_request, robot = a_robot, term = a_term, until = at + a_term
   from (select name, nextval('fleet.number') as fence from unnest(names) name) as numbered where resource = name;
@@ -745,6 +761,8 @@ create table fleet.process (
 create function fleet.poll(
   a_process uuid, a_host text, a_page text, some_robots text[], a_poll interval, out next_in double precision
 ) language plpgsql as $$
+declare
+  at timestamptz := fleet.clock();
 begin
   perform fleet.require_epoch();
   perform fleet.check_robots(some_robots);
@@ -753,12 +771,12 @@ begin
   end if;
   insert into fleet.process (process, host, page, robots, seen, poll)
     values (a_process, coalesce(a_host, host(inet_client_addr()), 'on the machine of the database'), a_page,
-      some_robots, fleet.clock(), a_poll)
+      some_robots, at, a_poll)
     on conflict (process) do update set page = excluded.page, robots = excluded.robots, seen = excluded.seen;
   delete from fleet.process where process in (
-    select process from fleet.process where seen < fleet.clock() - interval '1 day' for update skip locked);
+    select process from fleet.process where seen < at - interval '1 day' for update skip locked);
   delete from fleet.place where place in (
-    select place from fleet.place where until < fleet.clock() - interval '1 min' for update skip locked);
+    select place from fleet.place where until < at - interval '1 min' for update skip locked);
   select s.next_in into next_in from fleet.sweep() s;
 end $$;
 
@@ -817,7 +835,8 @@ create view fleet.processes as
 
 -- --- Rights -------------------------------------------------------------------------------------------------------
 
--- Functions run with the rights of the schema's owner, so robots need no right to a table.
+-- Functions run with the rights of the schema's owner, so robots need no right to a table. (Their statements are planned
+-- once in a session: by itself PostgreSQL plans each anew for its first five calls, and those with arrays for all.)
 do $$
 declare
   f record;
@@ -827,6 +846,7 @@ begin
     if f.proname = any ('{connect,submit,claim,renew,complete,complete_some,complete_and_claim,fail,give_back,report,
         became,number_of,list_dead,look,cancel,retry,hold,keep,release,poll,leave,sweep}') then
       execute format('alter function %s security definer set search_path = fleet, pg_catalog, pg_temp', f.name);
+      execute format('alter function %s set plan_cache_mode = force_generic_plan', f.name);
       execute format('grant execute on function %s to fleet_robot', f.name);
     end if;
   end loop;
