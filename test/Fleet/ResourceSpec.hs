@@ -82,6 +82,15 @@ spec = describe "A resource" $ do
     map (\(_, begun, over) -> over - begun > 1.9 && over - begun < 2.1) found `shouldBe` [True]
     readIORef ends `shouldReturn` ["LeaseLost \"door\""]
 
+  for_ [(1.5, "is held still"), (1.9, "may be another's")] $ \(late, what) ->
+    it ("is used only within two thirds of the term after it was asked for: it " ++ what) $ do
+      found <- day $ \fake robots noting -> do
+        sleep 0.01 -- (The first poll is over.)
+        let first' : _ = robots
+        atomically (answering fake [After late])
+        holding first' door 0.8 (\_ -> noting 1 (sleep 1))
+      found `shouldBe` [(1, 0.01 + late, 1.01 + late)]
+
   it "is free when the term is over, after its holder's process has died" $ do
     found <- day $ \fake robots noting -> case robots of
       one : other : _ -> do

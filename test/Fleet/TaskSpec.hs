@@ -148,6 +148,18 @@ spec = do
           lost > 6 && lost < 7 && again > 20 && over == again + 20 && ends == [("a", Done)]
         _ -> False
 
+    it "do not begin when the answer comes too late" $ do
+      begun <- newIORef []
+      _ <- simulate (do
+        fake <- newFakeDatabase
+        withFleetOptions defaultFleetOptions {taskTerm = 2} (fakeDatabase fake) amy $ \fleet -> do
+          sleep 1
+          submitting fleet defaultSubmitOptions "a"
+          atomically (answering fake [After 1.8])
+          serves fleet 20 (\_ -> now >>= \time -> pure () <$ modifyIORef' begun (time :))) >>= well
+      -- (Started at 1.9 s, lost when the answer comes at 2.8 s, and started again at the next poll after 3.9 s.)
+      readIORef begun >>= (`shouldSatisfy` \case [time] -> time > 3.9 && time < 6.5; _ -> False)
+
     it "are waited for by robots for as long as the database is away" $ do
       found <- day $ \fake fleet -> do
         let reachable = atomically . setReachable fake

@@ -45,7 +45,8 @@ def until(condition, seconds, what="it", step=0.01):
 
 def psql(text, user="owner", database="fleet", host=FOLDER):
     """What the statements give; each is a transaction of its own."""
-    done = subprocess.run(["psql", "-XqAt", "-v", "ON_ERROR_STOP=1", "-h", host, "-U", user, "-d", database],
+    # (Debian's own psql is a program in Perl, which starts this one.)
+    done = subprocess.run([f"{BIN}/psql", "-XqAt", "-v", "ON_ERROR_STOP=1", "-h", host, "-U", user, "-d", database],
                           input=text, text=True, capture_output=True, check=False)
     if done.returncode:
         raise RuntimeError(done.stderr)

@@ -13,6 +13,7 @@ module Behavior.Fleet.Internal.Lease
   , Lease
   , Standing (..)
   , withLease
+  , lostAt
   , standing
   , loses
 
@@ -78,14 +79,17 @@ standing = readTVar . standing_
 loses :: Lease -> STM ()
 loses = become LeaseIsLost
 
--- | Keeps a lease while the behaviour runs, that was asked for at this time.
-withLease :: Leases -> LeaseName -> Seconds -> Seconds -> (Lease -> Behavior a) -> Behavior a
-withLease leases name lasts asked = bracket enter (const exit)
+-- | Keeps a lease while the behaviour runs, that was asked for at this time. (If the answer has come too late, it is lost
+-- before the behaviour begins.)
+withLease :: Leases -> Behavior Seconds -> LeaseName -> Seconds -> Seconds -> (Lease -> Behavior a) -> Behavior a
+withLease leases clock name lasts asked = bracket enter (const exit)
  where
-  enter = atomically $ do
-    lease <- Lease lasts <$> newTVar asked <*> newTVar Valid
-    modifyTVar' (entered leases) (+ 1)
-    lease <$ modifyTVar' (held leases) (Map.insert name lease)
+  enter = do
+    time <- clock
+    atomically $ do
+      lease <- Lease lasts <$> newTVar asked <*> newTVar (if time < lostAt asked lasts then Valid else LeaseIsLost)
+      modifyTVar' (entered leases) (+ 1)
+      lease <$ modifyTVar' (held leases) (Map.insert name lease)
   exit = atomically (modifyTVar' (held leases) (Map.delete name))
 
 -- | The lease of this task, if it is one of these, is to be renewed now.
@@ -135,11 +139,16 @@ renewing leases clock renew keep = forever $ do
 -- | Those that are lost by the own clock become so. (Nothing else that happens, or hangs, is in the way of that.)
 expiring :: Leases -> Behavior Seconds -> Behavior a
 expiring leases clock = forever $ do
-  untilNext leases clock (1 / 20) (at (2 / 3)) retry
+  untilNext leases clock (1 / 20) end retry
   time <- clock
   atomically $ valid leases >>= traverse_ (unlessAt time)
  where
-  unlessAt time lease = at (2 / 3) lease >>= \end -> when (time >= end) (become LeaseIsLost lease)
+  end lease = (`lostAt` term lease) <$> readTVar (askedAt lease)
+  unlessAt time lease = end lease >>= \ends -> when (time >= ends) (become LeaseIsLost lease)
+
+-- | When one is lost that was asked for at this time, for this term.
+lostAt :: Seconds -> Seconds -> Seconds
+lostAt asked lasts = asked + 2 / 3 * lasts
 
 -- | When that share of its term has passed.
 at :: Seconds -> Lease -> STM Seconds

@@ -85,7 +85,8 @@ isLeaseLost fault = case fault of
 --
 -- The term, of 0.1 s to a day, is how long the resource stays held if this robot's process dies. While it lives, the
 -- hold is renewed at each third of it. The behaviour is interrupted when two thirds have passed since the last renewal
--- was /asked for/, by this machine's own clock, which goes on while it is suspended.
+-- was /asked for/, by this machine's own clock, which goes on while it is suspended. (If the answer takes as long as
+-- that, the resource is asked for again.)
 --
 -- So no other robot holds the resource meanwhile, /if/ this process runs, and stopping the behaviour and a step of the
 -- database's clock take together less than a third of the term. Otherwise only the fence protects, and a resource that
@@ -135,18 +136,22 @@ holdingFor patience fleet which seconds use = do
   number <- newUnique (database fleet)
   (`finally` release number) $ do
     (asked, fences) <- inTime . waitFor $ Wish number (Set.fromList names) (Text.pack (robotName (robot fleet))) seconds
-    withLease (leases fleet) (OfWish number) seconds asked $ \lease ->
+    withLease (leases fleet) clock (OfWish number) seconds asked $ \lease ->
       insteadWhen (named "lease lost" (watching ((/= Valid) <$> standing lease))) (throwIO (LeaseLost called)) $
         use [(Resource name, Fence n) | (name, Number n) <- fences]
  where
   names = [name | Resource name <- which]
   called = intercalate ", " (map Text.unpack names)
+  clock = ownClock (database fleet)
   inTime wait = maybe wait (\limit -> timeout limit wait ? throwIO (StillHeld called limit)) patience
   release number = posted fleet listening (Release number)
   waitFor wish = Trace.named ("wait for " ++ called) . withNotices fleet (map OfResource names) $ \wait ->
     let go = do
           (asked, answer) <- requestTimed fleet listening (Hold wish)
+          time <- clock
           either (throwIO . refusedAs) pure answer >>= \case
+            -- (The answer came too late. If it is held still, it is then renewed.)
+            Holds _ | time >= lostAt asked seconds -> go
             Holds fences -> (asked, fences) <$ atomically (mapM_ (seen fleet . snd) fences)
             AskAgainIn again -> wait (max 0.005 (min 3 again)) >> go
      in go

@@ -117,7 +117,7 @@ servingWith fleet which@(Queue name) behavior = mask $ \restore ->
         let fails = failing fleet start
             lease = OfStart (startTask start) (startLease start)
         ended <-
-          withLease (leases fleet) lease (taskTerm (options fleet)) asked $ \it ->
+          withLease (leases fleet) (ownClock (database fleet)) lease (taskTerm (options fleet)) asked $ \it ->
             tryAny (restore (underway fleet which next start it behavior))
               `onException` fails "its robot was stopped"
         case ended of
