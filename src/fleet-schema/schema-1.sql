@@ -358,20 +358,24 @@ declare
     select needs::text from kinds where needs <@ skills);
   expired int := 0;
   a_robot text;
-  kind text[];
+  kind text;
   t fleet.task;
 begin
   if cardinality(kinds) = 0 then return; end if;
   foreach a_robot in array some_robots loop
     loop
       t := null;
-      for kind in
-        select k.needs from (select it::text[] as needs from unnest(kinds) it) k cross join lateral (
-            select priority, task from fleet.task f where state = 'waiting' and queue = a_queue and f.needs = k.needs
+      -- (Mostly there is one.)
+      if cardinality(kinds) > 1 then
+        kinds := array(
+          select kind.needs from unnest(kinds) kind (needs) cross join lateral (
+            select priority, task from fleet.task f
+            where state = 'waiting' and queue = a_queue and f.needs = kind.needs::text[]
             order by priority desc, task limit 1) first
-        order by first.priority desc, first.task
-      loop
-        select * into t from fleet.task f where state = 'waiting' and queue = a_queue and f.needs = kind
+          order by first.priority desc, first.task);
+      end if;
+      foreach kind in array kinds loop
+        select * into t from fleet.task f where state = 'waiting' and queue = a_queue and f.needs = kind::text[]
           order by priority desc, task limit 1 for update skip locked;
         exit when found;
       end loop;
