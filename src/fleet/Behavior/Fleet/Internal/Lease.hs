@@ -79,7 +79,7 @@ standing = readTVar . standing_
 loses :: Lease -> STM ()
 loses = become LeaseIsLost
 
--- | Keeps a lease while the behaviour runs, that was asked for at this time. (If the answer has come too late, it is lost
+-- | Keeps a lease while the behaviour runs, that was asked for at this time. (If the answer came too late, it is lost
 -- before the behaviour begins.)
 withLease :: Leases -> Behavior Seconds -> LeaseName -> Seconds -> Seconds -> (Lease -> Behavior a) -> Behavior a
 withLease leases clock name lasts asked = bracket enter (const exit)
