@@ -761,9 +761,10 @@ create table fleet.process (
 );
 
 -- To be called every few seconds, and when a task is due: the process runs these robots. (Its host is by default what
--- the database knows of it.) Sweeps.
+-- the database knows of it.) Sweeps; then, when the next task is due, and the queues in which tasks wait.
 create function fleet.poll(
-  a_process uuid, a_host text, a_page text, some_robots text[], a_poll interval, out next_in double precision
+  a_process uuid, a_host text, a_page text, some_robots text[], a_poll interval,
+  out next_in double precision, out waiting text[]
 ) language plpgsql as $$
 declare
   at timestamptz := fleet.clock();
@@ -782,6 +783,13 @@ begin
   delete from fleet.place where place in (
     select place from fleet.place where until < at - interval '1 min' for update skip locked);
   select s.next_in into next_in from fleet.sweep() s;
+  waiting := array(
+    with recursive queues as (
+      (select queue from fleet.task where state = 'waiting' order by queue limit 1)
+      union all
+      select (select queue from fleet.task where state = 'waiting' and queue > queues.queue order by queue limit 1)
+      from queues where queue is not null)
+    select queue from queues where queue is not null);
 end $$;
 
 -- The process has ended.

@@ -13,7 +13,7 @@ module Fleet.Requests
   ) where
 
 import Data.Aeson (Value (..))
-import Data.Bifunctor (first)
+import Data.Bifunctor (bimap, first)
 import Data.Function (on)
 import Data.List (nub, nubBy, sort, sortOn)
 import qualified Data.Set as Set
@@ -76,7 +76,7 @@ step =
     , (25, always (Hold <$> (Wish <$> wishes <*> resources <*> robot <*> term)) shownHeld)
     , (10, always (Keep <$> listOf wishes) (show . sort))
     , (10, always (Release <$> wishes) show)
-    , (5, always (pure (Poll (Presence (fromWords 0 0 0 99) Nothing ["amy"] 5))) (show . fmap rounded))
+    , (5, always (pure (Poll (Presence (fromWords 0 0 0 99) Nothing ["amy"] 5))) (show . bimap (fmap rounded) sort))
     ]
  where
   always asked shown = (\request -> Asks (const (Asked request shown))) <$> asked

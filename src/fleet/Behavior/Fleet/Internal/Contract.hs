@@ -68,8 +68,8 @@ data Request r where
   -- | Those that keep what they hold.
   Keep :: [UUID] -> Request [UUID]
   Release :: UUID -> Request ()
-  -- | Gives when the clock will make something due.
-  Poll :: Presence -> Request (Maybe Seconds)
+  -- | Gives when the clock will make something due, and the queues in which tasks wait.
+  Poll :: Presence -> Request (Maybe Seconds, [Text])
   Leave :: UUID -> Request ()
 
 -- | The same, if it is not known what was answered. (Each of the others may simply be asked again.)

@@ -143,10 +143,12 @@ polling fleet = forever $ do
   atomically (writeTVar (pollNow fleet) False)
   let presence = Presence (processId fleet) (Text.pack <$> pageAddress chosen) names (pollEvery chosen)
   next <- tryAny (request fleet listening (Poll presence))
-  atomically (noticed fleet OfAnything)
+  atomically $ case next of
+    Right (Right (_, queues)) -> modifyTVar' (missed fleet) (+ 1) >> mapM_ (noticed fleet . OfQueue) queues
+    _ -> noticed fleet OfAnything
   -- (While the database is away, or refuses, it is asked again.)
   let wait = case next of
-        Right (Right (Just seconds)) -> min (pollEvery chosen) (max 0.05 seconds)
+        Right (Right (Just seconds, _)) -> min (pollEvery chosen) (max 0.05 seconds)
         _ -> pollEvery chosen
   timeout wait (atomically (readTVar (pollNow fleet) >>= check)) ? pure ()
  where

@@ -16,6 +16,7 @@ module Behavior.Fleet.Internal.Sql
 
 import Control.Exception (throwIO)
 import Control.Monad (void, (>=>))
+import Data.Bifunctor (bimap)
 import Data.Char (toLower)
 import Data.Either (partitionEithers)
 import Data.Int (Int64)
@@ -106,9 +107,9 @@ called connection = \case
   Keep wishes -> map fromOnly <$> query connection "select fleet.keep(?::uuid[])" (Only (PGArray wishes))
   Release wish -> nothing "select fleet.release(?)" (Only wish)
   Poll it ->
-    fmap seconds . fromOnly
+    bimap (fmap seconds) fromPGArray
       <$> one
-        "select fleet.poll(?, null, ?, ?::text[], ? * interval '1 s')"
+        "select * from fleet.poll(?, null, ?, ?::text[], ? * interval '1 s')"
         (process it, itsPage it, texts (itsRobots it), everySeconds it)
   Leave it -> nothing "select fleet.leave(?)" (Only it)
  where
