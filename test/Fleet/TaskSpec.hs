@@ -148,6 +148,14 @@ spec = do
           lost > 6 && lost < 7 && again > 20 && over == again + 20 && ends == [("a", Done)]
         _ -> False
 
+    it "are found by the next poll when their notice was lost" $ do
+      begun <- newIORef 0
+      _ <- day $ \fake fleet -> do
+        atomically (losingNotices fake True)
+        let work _ = now >>= \time -> pure () <$ writeIORef begun time
+        serves fleet 12 work `both` (sleep 1 >> submitting fleet defaultSubmitOptions "a")
+      readIORef begun >>= (`shouldSatisfy` \time -> time > 1 && time < 6)
+
     it "do not begin when the answer comes too late" $ do
       begun <- newIORef []
       _ <- simulate (do
