@@ -848,7 +848,7 @@ create view fleet.processes as
 -- --- Rights -------------------------------------------------------------------------------------------------------
 
 -- Functions run with the rights of their owner, so robots need no right to a table. (Their statements are planned once
--- in a session: by itself PostgreSQL plans each anew for its first five calls, and those with arrays for all.)
+-- in a session: by itself PostgreSQL plans each again for its first five calls, and those with arrays for all.)
 do $$
 declare
   f record;
