@@ -158,13 +158,8 @@ spec = do
 
     it "do not begin when the answer comes too late" $ do
       begun <- newIORef []
-      _ <- simulate (do
-        fake <- newFakeDatabase
-        withFleetOptions defaultFleetOptions {taskTerm = 2} (fakeDatabase fake) amy $ \fleet -> do
-          sleep 1
-          submitting fleet defaultSubmitOptions "a"
-          atomically (answering fake [After 1.8])
-          serves fleet 20 (\_ -> now >>= \time -> pure () <$ modifyIORef' begun (time :))) >>= well
+      startAnsweredAfter 1.8 2 $ \_ fleet ->
+        serves fleet 20 (\_ -> now >>= \time -> pure () <$ modifyIORef' begun (time :))
       -- (Started at 1.9 s, lost when the answer comes at 2.8 s, and started again at the next poll after 3.9 s.)
       readIORef begun >>= (`shouldSatisfy` \case [time] -> time > 3.9 && time < 6.5; _ -> False)
 
@@ -178,17 +173,11 @@ spec = do
 
     it "have leases that count from before they were asked for" $ do
       stopped <- newIORef 0
-      _ <- simulate (do
-        fake <- newFakeDatabase
-        withFleetOptions defaultFleetOptions {taskTerm = 3} (fakeDatabase fake) amy $ \fleet -> do
-          sleep 1
-          submitting fleet defaultSubmitOptions "a"
-          atomically (answering fake [After 1.5])
-          let work _ = do
-                atomically (setReachable fake False)
-                sleep 20 `finally` (now >>= writeIORef stopped)
-                pure (pure ())
-          serves fleet 10 work) >>= well
+      startAnsweredAfter 1.5 3 $ \fake fleet ->
+        serves fleet 10 $ \_ -> do
+          atomically (setReachable fake False)
+          sleep 20 `finally` (now >>= writeIORef stopped)
+          pure (pure ())
       readIORef stopped >>= (`shouldSatisfy` \time -> time >= 3 && time < 3.2)
 
     for_ [Busy, BadArgument "no"] $ \refusal ->
@@ -484,7 +473,20 @@ submitting fleet chosen key = void (submitWith chosen fleet orders key 1)
 
 -- | A robot in a fleet, on a fake database.
 day :: (FakeDatabase -> Fleet -> Behavior a) -> IO a
-day act = simulate (newFakeDatabase >>= \fake -> withFleet (fakeDatabase fake) amy (act fake)) >>= well
+day = dayWith defaultFleetOptions
+
+dayWith :: FleetOptions -> (FakeDatabase -> Fleet -> Behavior a) -> IO a
+dayWith chosen act =
+  simulate (newFakeDatabase >>= \fake -> withFleetOptions chosen (fakeDatabase fake) amy (act fake)) >>= well
+
+-- | A day with that term, and with a task. Its start is asked for at 1 s, and answered after that long.
+startAnsweredAfter :: Seconds -> Seconds -> (FakeDatabase -> Fleet -> Behavior ()) -> IO ()
+startAnsweredAfter late lasts act =
+  dayWith defaultFleetOptions {taskTerm = lasts} $ \fake fleet -> do
+    sleep 1
+    submitting fleet defaultSubmitOptions "a"
+    atomically (answering fake [After late])
+    act fake fleet
 
 -- | The database, where each request is answered so.
 through :: (forall r. Request r -> Behavior (Either Refusal r) -> Behavior (Either Refusal r)) -> Database -> Database

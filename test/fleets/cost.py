@@ -77,15 +77,19 @@ select 'orders', 'done ' || n, 'done', 0, '{{}}', jsonb_build_array(n, 0), at, '
 from generate_series(1, {count}) n, clock_timestamp() at
 """
 CLAIMS = 300
+BOTH = "few", "many"
 
 
 def row_6():
     """A database with a million tasks that are done, and another one with a thousand."""
-    for name, count in [("few", 1000), ("many", 1_000_000)]:
+    for name, count in zip(BOTH, [1000, 1_000_000]):
         psql(f"create database {name} owner owner", user="postgres", database="postgres")
         subprocess.run([f"{BUILT}/behavior-fleet", "create", f"host={FOLDER} dbname={name} user=owner"], check=True,
                        stdout=subprocess.DEVNULL)
         psql(KEPT.format(count=count), database=name)
+    few, many = medians(one_poll)
+    claim(6, "a poll, without its commit, with a thousand finished tasks, and with a million",
+          f"{few * 1000:.2f} ms, {many * 1000:.2f} ms: {many / few:.2f} times", "at most 1.5 times", many <= 1.5 * few)
     # As if they had been kept for less: in each second the time of a thousand has come; then that of many at once.
     passing = """
       update fleet.task set wakes = clock_timestamp() + n * interval '{}' from (
@@ -110,16 +114,20 @@ def row_6():
 
 
 def claims(name, before):
-    """The medians of the seconds that one claim takes, in the database with few tasks and in that with many, which are
-    prepared so: in turn, for what else the machine does costs both."""
-    both = "few", "many"
-    for database, prepare in zip(both, before):
+    """The medians of the seconds that one claim takes, in databases that are prepared so."""
+    for database, prepare in zip(BOTH, before):
         psql(f"select count(fleet.submit('orders', '{name} ' || n, '[1, 0]')) from generate_series(1, {CLAIMS}) n",
              database=database)
         psql(prepare, database=database)
+    return medians(one_claim)
+
+
+def medians(one):
+    """Of the seconds that one takes in the database with few tasks and in that with many: in turn, for what else the
+    machine does costs both."""
     psql("checkpoint", user="postgres")  # (What was written before is no cost of these.)
-    connections = [psycopg2.connect(address(database)) for database in both]
-    times = [[one_claim(connection) for connection in connections] for _ in range(CLAIMS)]
+    connections = [psycopg2.connect(address(database)) for database in BOTH]
+    times = [[one(connection) for connection in connections] for _ in range(CLAIMS)]
     for connection in connections:
         connection.close()
     return map(statistics.median, zip(*times))
@@ -132,5 +140,15 @@ def one_claim(connection):
         cursor.execute("select task, lease from fleet.claim('orders', '{robot}', '{}', '10 s')")
         took = time.monotonic() - begun
         cursor.execute("select fleet.complete(%s, %s, 'null')", cursor.fetchone())
+    connection.commit()
+    return took
+
+
+def one_poll(connection):
+    with connection.cursor() as cursor:
+        cursor.execute("select")
+        begun = time.monotonic()
+        cursor.execute("select * from fleet.poll('00000000-0000-0000-0000-000000000001', 'host', null, '{robot}', '5 s')")
+        took = time.monotonic() - begun
     connection.commit()
     return took
