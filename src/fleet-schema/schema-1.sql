@@ -655,8 +655,10 @@ begin
   if exists (select from unnest(names) name where name is null or length(name) not between 1 and 200) then
     perform fleet.refuse('FL002', 'the name of a resource has 1 to 200 characters');
   end if;
+  -- (One that is there is not inserted, for that would wait for a transaction that changes it.)
   insert into fleet.resource (resource, term, until)
-    select name, a_term, holds_from from unnest(names) name, fleet.about order by name on conflict do nothing;
+    select name, a_term, holds_from from unnest(names) name, fleet.about
+    where not exists (select from fleet.resource where resource = name) order by name on conflict do nothing;
   -- First without locks, so that those who wait do not wait for each other; then, for what changes a resource, with.
   <<looking>>
   foreach is_locked in array array[false, true] loop

@@ -7,9 +7,12 @@ import subprocess
 import sys
 import threading
 import time
+import uuid
+from concurrent.futures import ThreadPoolExecutor
 
+import psycopg2
 from claims import claim
-from fleet import CLOCK, FOLDER, SEED, TRUE_CLOCK, Robot, fresh, kill_all, number, psql, server, until
+from fleet import CLOCK, FOLDER, SEED, TRUE_CLOCK, Robot, address, fresh, kill_all, number, psql, server, until
 
 TERM = 1
 
@@ -80,7 +83,34 @@ def carried(row, orders, kills, freezes, is_python):
 
 def row_2():
     """Doors that one robot passes at a time: there are ten, each with ten robots."""
+    asked_at_once()
     passed(2, lambda n: False, doors=10, times=10)
+
+
+def asked_at_once():
+    """A free door that two ask for at once: the second waits for the first's transaction, then for the door."""
+    fresh()
+    hold = lambda name: f"select fences from fleet.hold('{uuid.uuid4()}', '{{door}}', '{name}', '10 s')"
+    psql(f"{hold('amy')}; select fleet.release(request) from fleet.resource")
+    first, second, watching = (psycopg2.connect(address()) for _ in range(3))
+    watching.autocommit = True
+
+    def ask(connection, statement):
+        with connection.cursor() as cursor:
+            cursor.execute(statement)
+            return cursor.fetchone()[0]
+
+    answers = [ask(first, hold("bob"))]
+    with ThreadPoolExecutor() as beside:
+        answer = beside.submit(ask, second, hold("carl"))
+        waits = f"select wait_event_type = 'Lock' from pg_stat_activity where pid = {second.info.backend_pid}"
+        until(lambda: ask(watching, waits), 10, "the second's wait", step=0)
+        first.commit()
+        answers.append(answer.result())
+    has = [fences is not None for fences in answers]
+    claim(2, "two that ask for a free door at once: whether they have it", has, [True, False], has == [True, False])
+    for connection in (first, second, watching):
+        connection.close()
 
 
 class Door:
