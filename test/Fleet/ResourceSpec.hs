@@ -142,7 +142,7 @@ spec = describe "A resource" $ do
               Release _ -> sleep 0.25 >> throwIO (ConnectionLost "lost")
               request -> asking request
             at = fakeDatabase fake
-        withFleet at {opening = \use -> opening at (use . over)} (Robot "amy" []) $ \amy ->
+        withFleet at {opening = \limit use -> opening at limit (use . over)} (Robot "amy" []) $ \amy ->
           withRobot amy (Robot "bob" []) $ \bob -> do
             Signal.waitUntil (databaseUp amy)
             times <- allOf [now <* holding amy door 3 (\_ -> pure ()), sleep 0.1 >> holding bob charger 3 (const now)]

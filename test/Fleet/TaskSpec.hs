@@ -490,7 +490,7 @@ startAnsweredAfter late lasts act =
 
 -- | The database, where each request is answered so.
 through :: (forall r. Request r -> Behavior (Either Refusal r) -> Behavior (Either Refusal r)) -> Database -> Database
-through answers at = at {opening = \use -> opening at (use . over)}
+through answers at = at {opening = \limit use -> opening at limit (use . over)}
  where
   over session = session {ask = \request -> answers request (ask session request)}
 

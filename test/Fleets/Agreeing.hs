@@ -29,7 +29,7 @@ agreeing :: ByteString -> String -> Int -> Int -> IO Bool
 agreeing owner robot seed count = do
   admin <- connectPostgreSQL owner
   replaceClock admin
-  opening (postgres robot) $ \session -> do
+  opening (postgres robot) 5 $ \session -> do
     listen session
     result' <- quickCheckWithResult stdArgs {maxSuccess = count, replay = Just (mkQCGen seed, 0)} $
       forAllShrinkShow steps (shrinkList (const [])) (const "") $ \these -> monadicIO $ do

@@ -117,7 +117,7 @@ data Watch = Watch
 -- | The database, of which each use of a connection is watched: none comes after one that was interrupted, and no two
 -- come at once. Of six uses one is interrupted, at a random moment, as a limit of time would interrupt it.
 watched :: Watch -> Database -> Database
-watched watch at = at {opening = \use -> opening at (\session -> newTVarIO True >>= use . over session)}
+watched watch at = at {opening = \limit use -> opening at limit (\session -> newTVarIO True >>= use . over session)}
  where
   over session isFree =
     session

@@ -1,8 +1,10 @@
-"""Row 3: the database is stopped; and a standby takes its place, when it was killed, and when it is frozen."""
+"""Row 3: the database is stopped; it is slow; and a standby takes its place, when it was killed, and when it is
+frozen."""
 
 import os
 import shutil
 import signal
+import subprocess
 import time
 
 from claims import claim
@@ -15,6 +17,7 @@ OTHER = f"{FOLDER}/sockets"
 
 def row_3():
     stopped()
+    slow()
     standing_by("data", "other", FOLDER, OTHER, "killed")
     # (Libpq asks the first server of the address first: this one is the frozen one.)
     standing_by("other", "data", OTHER, FOLDER, "frozen")
@@ -49,6 +52,24 @@ def stopped():
     goes_on("stopped", robots, up)
     claim(3, "stopped: robots' processes that have ended by themselves", ended, [], ended == [])
     judge_orders("stopped", office, 124)
+
+
+def slow():
+    """A server that takes three seconds to answer who connects: for longer than a client has patience, at first."""
+    fresh()
+    folder = f"{FOLDER}/slow"
+    os.makedirs(folder, exist_ok=True)
+    late = f"SYSTEM:sleep 3; exec socat - UNIX-CONNECT\\:{FOLDER}/.s.PGSQL.5432"
+    with subprocess.Popen(["socat", f"UNIX-LISTEN:{folder}/.s.PGSQL.5432,fork", late],
+                          stderr=subprocess.DEVNULL) as socat:
+        until(lambda: os.path.exists(f"{folder}/.s.PGSQL.5432"), 10, "the slow server")
+        begun = time.monotonic()
+        with Robot("submit", "office", 1, 1, 0, database=address(host=folder)) as office:
+            until(lambda: office.says("submitted") or time.monotonic() > begun + 30, 40)
+            took = float((office.says("submitted") or [["inf"]])[0][0]) - begun
+        socat.terminate()
+    claim(3, "slow: who connects to a server that takes 3 s to answer is connected after", f"{took:.1f} s",
+          "within 10 s", took <= 10)
 
 
 def goes_on(name, robots, since, limit=GOES_ON):

@@ -154,6 +154,8 @@ def passed(row, is_python, doors, times):
             Robot("visitor", f"{door.name}-{n}", door.name, door.socket, 0.9 + 0.1 * (n % 3), python=is_python(n))
             for n in range(10))}
         for door in doors}
+    everyone = [robot for its in robots.values() for robot in its.values()]
+    here = "select count(distinct application_name) from pg_stat_activity where application_name like 'door-%'"
     some, half = max(1, times // 5), times // 2
     phases = [
         # Name, blows at each door, the rate of the database's clock, its steps.
@@ -165,13 +167,13 @@ def passed(row, is_python, doors, times):
     ]
     blows = []
     try:
+        until(lambda: number(here) == len(everyone), 60, "the last robot", step=0.5)
         for name, its, rate, step in phases:
             psql(f"update clock set since = clock_timestamp(), rate = {rate}, step = 0")
             phase = Phase(doors, robots, its, step)
             blows += [kind for door in doors for kind, _, _, is_hit in phase.blows[door] if is_hit]
             judge_phase(row, name, phase, is_timed=(rate, step) == (1, 0), is_frozen="freeze" in its)
     finally:
-        everyone = [robot for its in robots.values() for robot in its.values()]
         ended = [" ".join([robot.name, *robot.last()]) for robot in everyone if robot.process.poll() is not None]
         claim(row, "robots' processes that have ended by themselves", ended, [], ended == [])
         kill_all(everyone)
@@ -182,6 +184,20 @@ def passed(row, is_python, doors, times):
     wanted = [len(doors) * count for count in (times, times, 2 * some)]
     claim(row, f"kills, freezes and cuts of the robot that is inside, at {len(doors)} doors", counts, wanted,
           counts == wanted)
+
+
+def tell(door, robots):
+    """Why nothing passes a door, as the database, the door and the robots tell it."""
+    waiting = f"application_name like '{door.name}-%' and state <> 'idle'"
+    print(f"{door.name}: no robot passes, at {time.monotonic():.2f}; its record ends with", door.record()[-3:])
+    print(psql(f"""
+      select 'the resource', fleet.clock(), * from fleet.resource where resource = '{door.name}';
+      select 'waits', * from fleet.place where '{door.name}' = any (resources) order by place;
+      select 'asks', application_name, pid, pg_blocking_pids(pid), wait_event, now() - xact_start, query
+        from pg_stat_activity where {waiting}
+    """))
+    for robot in robots.values():
+        print(robot.name, robot.process.pid, robot.process.poll(), *robot.last(), flush=True)
 
 
 class Phase:
@@ -221,7 +237,11 @@ class Phase:
             last, since = door.inside()
             wanted = lambda: door.inside() != (last, since) and door.inside()[0] and \
                 time.monotonic() - door.inside()[1] >= least
-            until(wanted, 60, "a robot that passes", step=0.002)
+            try:
+                until(wanted, 20, "a robot that passes", step=0.002)
+            except TimeoutError:
+                tell(door, robots)
+                raise
             name, since = door.inside()
             if name and self.struck(events[-1], door, robots[name], since):
                 events.pop()

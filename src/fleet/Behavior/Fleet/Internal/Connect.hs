@@ -20,7 +20,7 @@ import Data.ByteString (ByteString)
 import qualified Data.ByteString as Bytes
 import Data.Char (isSpace)
 import Data.IORef (newIORef)
-import Data.List (isInfixOf, isPrefixOf)
+import Data.List (isInfixOf, isPrefixOf, isSuffixOf)
 import Data.Maybe (fromMaybe)
 import Data.Text (Text)
 import qualified Data.Text as Text
@@ -35,12 +35,13 @@ import Behavior (Seconds, (?))
 import Behavior.Fleet.Internal.Error (ConnectionLost (..))
 import Behavior.Time (abandoning, timeout)
 
--- | Connects to the database at this address, and prepares the connection.
-connected :: String -> IO Connection
-connected address = losing $ do
+-- | Connects to the database at this address, each server of which has that many seconds to answer, and prepares the
+-- connection.
+connected :: Seconds -> String -> IO Connection
+connected limit address = losing $ do
   connection <-
-    timeout connectWithin (if rtsSupportsBoundThreads then abandoning 0.1 (byLibpq bytes) else connectPostgreSQL bytes)
-      ? throwIO (ConnectionLost ("no connection within " ++ show connectWithin ++ " s"))
+    timeout inAll (if rtsSupportsBoundThreads then abandoning 0.1 (byLibpq bytes) else connectPostgreSQL bytes)
+      ? throwIO (TooSlow ("no connection within " ++ show inAll ++ " s"))
   (`onException` close connection) $ do
     -- A transaction whose client is gone or hangs must not hold locks for long.
     void . execute_ connection $
@@ -52,10 +53,9 @@ connected address = losing $ do
       :: IO [Only Text]
     pure connection
  where
-  bytes = encodeUtf8 (Text.pack (withLimit address))
-
-connectWithin :: Seconds
-connectWithin = 5
+  bytes = encodeUtf8 (Text.pack (withLimit limit address))
+  -- (For two servers.)
+  inAll = 2.5 * limit
 
 -- | 'connectPostgreSQL' has no limit for each server of an address: so it never asks the second one while the first one
 -- is frozen. libpq has one, but nothing interrupts it.
@@ -68,22 +68,28 @@ byLibpq address = do
   connection <$ execute_ connection
     "set datestyle to iso; set client_encoding to utf8; set standard_conforming_strings to on"
 
--- | With a limit of two seconds for each server (the shortest that there is), unless the address has one.
-withLimit :: String -> String
-withLimit address
+-- | With a limit for each server, unless the address has one.
+withLimit :: Seconds -> String -> String
+withLimit limit address
   | "connect_timeout" `isInfixOf` address = address
   | any (`isPrefixOf` address) ["postgresql://", "postgres://"] =
-      address ++ (if '?' `elem` address then "&" else "?") ++ "connect_timeout=2"
-  | otherwise = "connect_timeout=2 " ++ address
+      address ++ (if '?' `elem` address then "&" else "?") ++ seconds
+  | otherwise = seconds ++ " " ++ address
+ where
+  seconds = "connect_timeout=" ++ show (ceiling limit :: Int)
 
 -- | What shows that the connection is of no use, or the database not ready, as 'ConnectionLost'.
 losing :: IO a -> IO a
 losing act = act `catches` [Handler ofServer, Handler ofClient]
  where
   ofServer e = if isLoss e then lost (Text.unpack (text (sqlErrorMsg e))) else throwIO e
-  -- (What libpq says is in the description.)
+  -- (What libpq says is in the description; last, what it says of the last server. It is in English, for GHC's runtime
+  -- chooses no language.)
   ofClient e = lost (if ioe_location e == "libpq" then ioe_description e else show e)
-  lost why = throwIO . ConnectionLost $ if all isSpace why then hasEnded else unwords (words why)
+  lost why
+    | all isSpace why = throwIO (ConnectionLost hasEnded)
+    | ["timeout", "expired"] `isSuffixOf` words why = throwIO (TooSlow (unwords (words why)))
+    | otherwise = throwIO (ConnectionLost (unwords (words why)))
 
 -- | Why, if libpq does not say it.
 hasEnded :: String

@@ -26,8 +26,9 @@ data Database = Database
   , newUnique :: Behavior UUID
   , ownClock :: Behavior Seconds
   -- ^ The clock by which a robot judges its own leases. It goes on while the machine is suspended, and never jumps.
-  , opening :: forall a. (Session -> Behavior a) -> Behavior a
-  -- ^ Connects, and runs the behaviour while it is connected.
+  , opening :: forall a. Seconds -> (Session -> Behavior a) -> Behavior a
+  -- ^ Connects, and runs the behaviour while it is connected. Each server of the address has that many seconds to
+  -- answer (if the address has no limit of its own).
   }
 
 -- | A connection. One behaviour at a time may use it (but for 'awaitNews'). Each of these throws

@@ -69,8 +69,11 @@ instance Exception FleetFault where
     Undecodable what why -> what ++ " is not what was expected: " ++ why
 
 -- | A connection is of no use any more, and why. (It never leaves the library.)
-newtype ConnectionLost = ConnectionLost String
+data ConnectionLost
+  = ConnectionLost {whyLost :: String}
+  | -- | The server (of several, the last) has not answered in time.
+    TooSlow {whyLost :: String}
   deriving (Show)
 
 instance Exception ConnectionLost where
-  displayException (ConnectionLost why) = why
+  displayException = whyLost

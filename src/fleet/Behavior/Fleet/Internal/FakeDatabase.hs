@@ -161,7 +161,7 @@ fakeDatabaseBy clock fake =
     { databaseName = "the fake database"
     , newUnique = atomically (numbered <$> stateTVar (unique fake) (\n -> (n, n + 1)))
     , ownClock = clock <$> now
-    , opening = \use -> do
+    , opening = \_ use -> do
         it <- atomically $ do
           reachable <- readTVar (isReachable fake)
           unless reachable (throwSTM (ConnectionLost "connection refused"))
@@ -179,7 +179,7 @@ fakeDatabaseBy clock fake =
 --
 -- @since 0.1.0.0
 cutOff :: TVar Bool -> Database -> Database
-cutOff isDead it = it {opening = \use -> opening it (use . cutting)}
+cutOff isDead it = it {opening = \limit use -> opening it limit (use . cutting)}
  where
   cutting session =
     session

@@ -1,5 +1,6 @@
 {-# OPTIONS_HADDOCK not-home #-}
 {-# LANGUAGE LambdaCase #-}
+{-# LANGUAGE ScopedTypeVariables #-}
 
 -- |
 -- What the robots of a process share: two connections, the leases that they have, and what was noticed.
@@ -173,7 +174,7 @@ requestPatiently fleet line asked = case whyNot asked of
 
 repeatedly :: Fleet -> (Fleet -> Line) -> Request r -> Behavior (Seconds, Either Refusal r)
 repeatedly fleet line asked = try (asking (line fleet) once) >>= \case
-  Left (ConnectionLost _) -> repeatedly fleet line (askedAgain asked)
+  Left (_ :: ConnectionLost) -> repeatedly fleet line (askedAgain asked)
   Right (_, Left Busy) -> do
     atomically (isAwayFor (line fleet) whyBusy)
     sleep 0.1

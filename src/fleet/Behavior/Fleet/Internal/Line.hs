@@ -24,7 +24,7 @@ import Control.Exception
 import Control.Monad (forever, join, unless)
 import Data.Maybe (isJust, isNothing)
 
-import Behavior (Behavior, StoppedWithFault (..), sleep, tryAny)
+import Behavior (Behavior, Seconds, StoppedWithFault (..), sleep, tryAny)
 import Behavior.Fleet.Internal.Database
 import Behavior.Fleet.Internal.Error
 import Behavior.Fleet.Internal.Options
@@ -67,17 +67,21 @@ whyAway = readTVar . lastWhy
 isAwayFor :: Line -> String -> STM ()
 isAwayFor = writeTVar . lastWhy
 
--- | Connects, and connects again whenever the connection is lost, with growing pauses. The first behaviour prepares a
--- connection; the second runs beside its use. Says why there is no connection, when that changes, and when there is one
--- again.
+-- | Connects, and connects again whenever the connection is lost, with growing pauses. A server that does not answer in
+-- time has twice as long the next time: for if many give it up and try again, it may have time for nothing else. The
+-- first behaviour prepares a connection; the second runs beside its use. Says why there is no connection, when that
+-- changes, and when there is one again.
 keeping
   :: Database -> Line -> (Maybe String -> STM ()) -> (Session -> Behavior ()) -> (Session -> Behavior ()) -> Behavior a
-keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go said (firstPause options)
+keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go said (firstPause options) firstLimit
  where
   options = lineOptions line
-  go said pause = do
-    begun <- now
-    ended <- tryAny (opening database (\session -> limited line (prepare session) >> used said session))
+  go said pause limit = do
+    begun <- newTVarIO Nothing
+    ended <- tryAny . opening database limit $ \session -> do
+      limited (max limit (answerWithin options)) (prepare session)
+      now >>= atomically . writeTVar begun . Just
+      used said session
     atomically $ do
       why <- case ended of
         Right why -> pure why
@@ -87,9 +91,13 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
           pure (Just (displayException why))
       before <- readTVar said
       unless (isNothing why || why == before) (writeTVar said why >> say why)
-    lasted <- subtract begun <$> now
+    end <- now
+    lasted <- maybe 0 (end -) <$> readTVarIO begun
     sleep pause
-    go said (if lasted > longestPause options then firstPause options else min (longestPause options) (2 * pause))
+    if lasted > longestPause options
+      then go said (firstPause options) firstLimit
+      else go said (min (longestPause options) (2 * pause)) $
+        if isSlow ended then min longestLimit (2 * limit) else limit
   used said session = do
     atomically $ do
       writeTVar (place line) (Free session)
@@ -101,6 +109,12 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
     InUse -> retry
     _ -> writeTVar (place line) Nowhere
   isFleetFault why = isJust (fromException why :: Maybe FleetFault)
+  isSlow ended = not (null [() | Left why <- [ended], Just (TooSlow _) <- [fromException why]])
+
+-- | How long a server has to answer who connects, in seconds. (Libpq knows no limit that is shorter than the first.)
+firstLimit, longestLimit :: Seconds
+firstLimit = 2
+longestLimit = 10
 
 -- | Runs a behaviour with the connection, when it is there and free. It has 'answerWithin' for that. Throws
 -- 'ConnectionLost' if the connection is lost meanwhile.
@@ -110,15 +124,15 @@ withSession line act = mask $ \restore -> do
     Free session -> session <$ writeTVar (place line) InUse
     Refusing fault -> throwSTM fault
     _ -> retry
-  result <- restore (limited line (act session)) `catch` \why -> do
+  result <- restore (limited (answerWithin (lineOptions line)) (act session)) `catch` \why -> do
     atomically (writeTVar (place line) (Broken (lossIn why)) >> writeTVar (lastWhy line) (displayException why))
     throwIO (onlyStop why)
   result <$ atomically (writeTVar (place line) (Free session))
  where
-  lossIn why = (\(ConnectionLost it) -> it) <$> fromException why
+  lossIn why = whyLost <$> fromException why
   -- (A loss that comes while it is stopped is nothing that its caller has to know.)
   onlyStop why = case fromException why of
-    Just (StoppedWithFault stop fault) | Just (ConnectionLost _) <- fromException fault -> stop
+    Just (StoppedWithFault stop fault) | isLoss fault -> stop
     _ -> why
 
 -- | 'withSession', by the thread of 'answering'. So a caller that is interrupted (it gives up waiting for a door, say)
@@ -146,17 +160,16 @@ posting line act = do
         let again = times > 1 && either isLoss not ended
         atomically (if again then writeTQueue (asked line) (go (times - 1)) else writeTVar isOver True)
   readTVar isOver <$ atomically (writeTQueue (asked line) (go 20))
- where
-  isLoss why = isJust (fromException why :: Maybe ConnectionLost)
+
+isLoss :: SomeException -> Bool
+isLoss why = isJust (fromException why :: Maybe ConnectionLost)
 
 -- | Does what was asked for, one after the other.
 answering :: Line -> Behavior a
 answering line = forever (join (atomically (readTQueue (asked line))))
 
 -- (A failure of the behaviour is its own, also one of a limit of time.)
-limited :: Line -> Behavior a -> Behavior a
-limited line act =
+limited :: Seconds -> Behavior a -> Behavior a
+limited seconds act =
   firstOf [Just <$> act, Nothing <$ sleep seconds]
-    >>= maybe (throwIO (ConnectionLost ("no answer within " ++ show seconds ++ " s"))) pure
- where
-  seconds = answerWithin (lineOptions line)
+    >>= maybe (throwIO (TooSlow ("no answer within " ++ show seconds ++ " s"))) pure

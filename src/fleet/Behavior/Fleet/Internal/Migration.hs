@@ -127,9 +127,9 @@ refuse = throwIO . SchemaFailure
 
 -- | Runs this with a connection of its own. What is wrong with the database is a 'SchemaFailure'.
 withDatabase :: String -> (Connection -> Behavior a) -> Behavior a
-withDatabase address act = bracket (connected address) close act `catches` [Handler away, Handler refused]
+withDatabase address act = bracket (connected 5 address) close act `catches` [Handler away, Handler refused]
  where
-  away (ConnectionLost why) = refuse ("there is no connection to the database: " ++ why)
+  away why = refuse ("there is no connection to the database: " ++ whyLost why)
   refused e
     | sqlState e == "55P03" = refuse "another program works on this schema, or uses it: try again"
     | otherwise = refuse ("the database refuses it: " ++ Text.unpack (text (sqlErrorMsg e)))

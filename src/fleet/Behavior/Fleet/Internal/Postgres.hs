@@ -50,7 +50,7 @@ postgres address =
     { databaseName = "the fleet's database"
     , newUnique = UUID.nextRandom
     , ownClock = (/ 1e9) . fromIntegral . toNanoSecs <$> getTime Boottime
-    , opening = \use -> bracket (connected address) close (sessionOver >=> use)
+    , opening = \limit use -> bracket (connected limit address) close (sessionOver >=> use)
     }
 
 sessionOver :: Connection -> IO Session
