@@ -122,8 +122,8 @@ replacing which = which {preempts = True}
 -- | Sends a goal, and waits for its result.
 --
 -- Interrupted, it ends only when the robot has confirmed that the goal has stopped: it asks the server to cancel
--- this goal, and asks again, after 20, 40, 80, 160 and then every 200 ms, since servers drop a cancel that comes before
--- they have accepted the goal.
+-- this goal, and asks again (five times after 20 ms each, then after 40, 80, 160 and every 200 ms), since servers drop a
+-- cancel that comes before they have accepted the goal.
 --
 -- [Result] The goal's.
 -- [Failure] 'Rejected', 'Aborted', 'CancelledByOther'; 'NoServer' if there is no link within
@@ -247,7 +247,7 @@ start ros which wanted latest = do
 confirmation :: Ros -> Action a -> Text -> Sent -> Behavior SentEnd
 confirmation ros which n running = do
   begun <- now
-  _ <- cleanupWithin limit (askEvery begun ([0.02, 0.04, 0.08, 0.16] ++ repeat 0.2))
+  _ <- cleanupWithin limit (askEvery begun (replicate 5 0.02 ++ [0.04, 0.08, 0.16] ++ repeat 0.2))
   atomically (leave ros n running Unconfirmed >> awaitEnd running)
  where
   limit = patience (rosOptions ros)
