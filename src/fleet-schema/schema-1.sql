@@ -435,8 +435,8 @@ begin
 end $$;
 
 -- Starts tasks of a queue that need nothing but these skills: one for each of the robots, or as many as there are. A
--- client that does not know what it was
--- answered asks again with the same request: then it has the same starts, if there were some, from now for their term.
+-- client that does not know what it was answered asks again with the same request: then it has the same starts, if
+-- there were some, from now for their term.
 create function fleet.claim(
   a_queue text, some_robots text[], skills text[], a_term interval,
   a_request uuid default null, is_again boolean default false

@@ -16,7 +16,7 @@ module Behavior.Fleet.Internal.Dispatch
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, allowInterrupt, onException, throwIO)
-import Control.Monad (filterM, forever, unless, when, zipWithM)
+import Control.Monad (filterM, forever, replicateM_, unless, when, zipWithM)
 import Data.Aeson (Value)
 import Data.Foldable (for_)
 import qualified Data.Map.Strict as Map
@@ -31,6 +31,7 @@ import Behavior.Fleet.Internal.Contract
 import Behavior.Fleet.Internal.Database
 import Behavior.Fleet.Internal.Fleet
 import Behavior.Fleet.Internal.Options
+import Behavior.Internal.Seam.Runtime (yieldReal)
 import Behavior.STM (atomically)
 
 -- | A robot that is to wait for a task of this queue. It does not wait yet.
@@ -124,6 +125,8 @@ areStarted fleet (_, group, waiting) answer = do
       when (null others) $ writeTVar (mayHave group) True
       concat <$> zipWithM (\it start -> handOver it (Right (asked, start))) served started
   for_ unwanted (giveBack fleet)
+  -- (What a robot does at once takes it some steps: so tasks that are over then are completed by one statement.)
+  replicateM_ 6 yieldReal
 
 -- | What the database answers, and when it was asked. It waits for a database that is away.
 answerTo :: Fleet -> Request r -> Behavior (Either SomeException (Seconds, r))

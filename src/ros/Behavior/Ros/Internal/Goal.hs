@@ -122,8 +122,8 @@ replacing which = which {preempts = True}
 -- | Sends a goal, and waits for its result.
 --
 -- Interrupted, it ends only when the robot has confirmed that the goal has stopped: it asks the server to cancel
--- this goal, and asks again (five times after 20 ms each, then after 40, 80, 160 and every 200 ms), since servers drop a
--- cancel that comes before they have accepted the goal.
+-- this goal, and asks again (five times after 20 ms each, then after 40, 80, 160 and every 200 ms), since servers drop
+-- a cancel that comes before they have accepted the goal.
 --
 -- [Result] The goal's.
 -- [Failure] 'Rejected', 'Aborted', 'CancelledByOther'; 'NoServer' if there is no link within
