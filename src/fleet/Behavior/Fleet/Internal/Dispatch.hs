@@ -14,6 +14,7 @@ module Behavior.Fleet.Internal.Dispatch
   , isDone
   ) where
 
+import Control.Concurrent (yield)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (SomeException, allowInterrupt, onException, throwIO)
 import Control.Monad (filterM, forever, replicateM_, unless, when, zipWithM)
@@ -31,7 +32,6 @@ import Behavior.Fleet.Internal.Contract
 import Behavior.Fleet.Internal.Database
 import Behavior.Fleet.Internal.Fleet
 import Behavior.Fleet.Internal.Options
-import Behavior.Internal.Seam.Runtime (yieldReal)
 import Behavior.STM (atomically)
 
 -- | A robot that is to wait for a task of this queue. It does not wait yet.
@@ -126,7 +126,7 @@ areStarted fleet (_, group, waiting) answer = do
       concat <$> zipWithM (\it start -> handOver it (Right (asked, start))) served started
   for_ unwanted (giveBack fleet)
   -- (What a robot does at once takes it some steps: so tasks that are over then are completed by one statement.)
-  replicateM_ 6 yieldReal
+  replicateM_ 6 yield
 
 -- | What the database answers, and when it was asked. It waits for a database that is away.
 answerTo :: Fleet -> Request r -> Behavior (Either SomeException (Seconds, r))
