@@ -68,9 +68,9 @@ doing at = \case
     when (everySeconds it < 0 || everySeconds it > 86400) $
       refuse "a process has a number of its own, and polls every 0 seconds to 1 day"
     change (\m -> m {places = Map.filter ((>= at - 60) . placeUntil) (places m)})
-    due <- sweep at
+    next <- sweep at
     waiting <- getting (filter ((== Waiting) . state . task) . Map.elems . rows)
-    pure (due, Set.toList (Set.fromList (map (toQueue . submitted) waiting)))
+    pure (next, Set.toList (Set.fromList (map (toQueue . submitted) waiting)))
   Leave _ -> pure ()
  where
   completeSome ends = concat <$> traverse (\(n, l, gave) -> complete at n l gave) (sortOn (\(n, _, _) -> n) ends)

@@ -166,11 +166,11 @@ completing fleet next start = \case
       Right (Left Busy) -> again whyBusy
       Right (Left refusal) -> throwIO (refusedAs refusal)
       -- It is not known whether it was committed: so that is asked for.
-      Left lost ->
+      Left why ->
         request fleet working (Became task lease) >>= granted >>= \case
           IsCompleted -> pure True
           IsLost -> pure False
-          StillRuns -> again (whyLost lost)
+          StillRuns -> again (whyLost why)
    where
     again why = if tries > 1 then committed (tries - 1) wanted else throwIO (NotCommitted why)
 
