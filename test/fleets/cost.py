@@ -37,8 +37,6 @@ def row_4():
 
 ROUNDS = int(os.environ.get("ROUNDS") or 3)
 TASKS = {1: 600, 4: 2000, 16: 4000}
-
-
 COMMITS = "select xact_commit from pg_stat_database where datname = 'fleet'"
 
 

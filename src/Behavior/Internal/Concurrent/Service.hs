@@ -6,15 +6,16 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Concurrent.Service
   ( servedBy
+  , betweenTurns
   ) where
 
-import Control.Concurrent.STM (check, newTVarIO, readTVar, writeTVar)
+import Control.Concurrent.STM (STM, check, newTVarIO, readTVar, writeTVar)
 import Control.Exception (finally, uninterruptibleMask_)
 
 import Behavior.Internal.Concurrent.Nursery (fork, scoped)
 import Behavior.Internal.Concurrent.Parallel (firstOf)
 import Behavior.Internal.Core.Failure (Behavior)
-import Behavior.Internal.Seam.Runtime (atomically)
+import Behavior.Internal.Seam.Runtime (Seconds, atomically, rest)
 
 -- | Runs the behaviour beside a service, which goes on until the behaviour has ended, cleanup included: what stops a
 -- robot must still reach it. (An operator requests the stop of all its branches together. So the thread of the
@@ -26,3 +27,7 @@ servedBy service behavior = do
   let untilOver = firstOf [service, atomically (readTVar over >>= check)]
   scoped $ \nursery ->
     (fork nursery (uninterruptibleMask_ untilOver) >> behavior) `finally` atomically (writeTVar over True)
+
+-- | What a service does between two turns of its work: it waits for that many seconds, or for the transaction.
+betweenTurns :: Seconds -> STM () -> Behavior ()
+betweenTurns seconds sooner = firstOf [rest seconds, atomically sooner]

@@ -26,6 +26,7 @@ module Behavior.Internal.Seam.Runtime
   , Seconds (..)
   , now
   , sleep
+  , rest
   , sleepUntil
   , sleepToSlot
 
@@ -40,7 +41,7 @@ module Behavior.Internal.Seam.Runtime
   , currentProperty
   ) where
 
-import Control.Concurrent (getNumCapabilities, yield)
+import Control.Concurrent (getNumCapabilities, threadDelay, yield)
 import Control.Concurrent.STM (STM)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
@@ -143,6 +144,12 @@ sleep :: Seconds -> IO ()
 sleep seconds = do
   _ <- duration "sleep" seconds
   when (seconds > 0) $ now >>= \t -> sleepBetween t (t + seconds)
+
+-- | 'sleep' of at most a day, for a thread that is hardly ever interrupted, in a process that may be idle otherwise:
+-- it has a timer of its own, so nothing is woken before its end. (Others are woken after 1, 2, 4 s and so on, and each
+-- time GHC's runtime ticks for a while, and looks for garbage.)
+rest :: Seconds -> IO ()
+rest seconds = inSimulation (threadDelay (ceiling (min 86400 seconds * 1000000))) (const (sleep seconds))
 
 -- | Sleeps until a point in time on the clock of 'now'; returns at once if that has passed.
 --

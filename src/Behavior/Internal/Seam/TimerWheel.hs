@@ -8,10 +8,9 @@
 -- costs nothing, because it unregisters nothing.
 --
 -- A cancelled sleeper leaves an entry in the bucket's queue until the bucket is filled.
--- Therefore a thread waits only at a bucket that is at most one second away, or at most four times
--- as far as it has slept so far, if that is longer. So the entry of a cancelled short sleep is gone
--- within a second, and that of a long one within four times the time that it had slept; and a sleep
--- of five seconds is woken once before its end.
+-- Therefore a thread waits only at a bucket that is at most one second away, or at most as far
+-- as it has slept so far, if that is longer. So the entry of a cancelled short sleep is gone within
+-- a second, and that of a long one within the time that it had slept.
 --
 -- (A process made by @forkProcess@ while another thread slept has a copy of the armed timers,
 -- but not the threads that run them: nothing wakes there.)
@@ -86,7 +85,7 @@ sleepTicks from end = go from
 -- | The tick of the bucket to wait at next. The arguments are the ticks at which the sleep began, at which it is
 -- to end, and until which it has lasted.
 nextBucket :: Tick -> Tick -> Tick -> Tick
-nextBucket from end t = t + min (end - t) (max ticksPerSecond (4 * (t - from)))
+nextBucket from end t = t + min (end - t) (max ticksPerSecond (t - from))
 
 -- | About a century from now. It stands for an infinite time, and can be counted in ticks.
 forever :: Double -> Double

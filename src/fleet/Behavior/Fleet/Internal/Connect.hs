@@ -83,12 +83,11 @@ losing :: IO a -> IO a
 losing act = act `catches` [Handler ofServer, Handler ofClient]
  where
   ofServer e = if isLoss e then lost (Text.unpack (text (sqlErrorMsg e))) else throwIO e
-  -- (What libpq says is in the description; last, what it says of the last server. It is in English, for GHC's runtime
-  -- chooses no language.)
+  -- (What libpq says is in the description: a line for each server, in English, for GHC's runtime chooses no language.)
   ofClient e = lost (if ioe_location e == "libpq" then ioe_description e else show e)
   lost why
     | all isSpace why = throwIO (ConnectionLost hasEnded)
-    | ["timeout", "expired"] `isSuffixOf` words why = throwIO (TooSlow (unwords (words why)))
+    | all ("timeout expired" `isSuffixOf`) (lines why) = throwIO (TooSlow (unwords (words why)))
     | otherwise = throwIO (ConnectionLost (unwords (words why)))
 
 -- | Why, if libpq does not say it.

@@ -125,7 +125,7 @@ areStarted fleet (_, group, waiting) answer = do
       when (null others) $ writeTVar (mayHave group) True
       concat <$> zipWithM (\it start -> handOver it (Right (asked, start))) served started
   for_ unwanted (giveBack fleet)
-  -- (What a robot does at once takes it some steps: so tasks that are over then are completed by one statement.)
+  -- (First those that have a task run: what they do at once takes some steps, and is completed by one statement.)
   replicateM_ 6 yield
 
 -- | What the database answers, and when it was asked. It waits for a database that is away.

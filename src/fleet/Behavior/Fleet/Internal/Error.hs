@@ -71,7 +71,7 @@ instance Exception FleetFault where
 -- | A connection is of no use any more, and why. (It never leaves the library.)
 data ConnectionLost
   = ConnectionLost {whyLost :: String}
-  | -- | The server (of several, the last) has not answered in time.
+  | -- | The server (of several, each) has not answered in time.
     TooSlow {whyLost :: String}
   deriving (Show)
 

@@ -17,7 +17,7 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
 import qualified Data.Text as Text
 
-import Behavior (Behavior, tryAny, (?))
+import Behavior (Behavior, tryAny)
 import Behavior.Fleet.Internal.Check (whyNotRobot)
 import Behavior.Fleet.Internal.Contract
 import Behavior.Fleet.Internal.Database
@@ -28,10 +28,9 @@ import Behavior.Fleet.Internal.Lease
 import Behavior.Fleet.Internal.Line
 import Behavior.Fleet.Internal.Options
 import Behavior.Fleet.Internal.Version
-import Behavior.Internal.Concurrent.Service (servedBy)
+import Behavior.Internal.Concurrent.Service (betweenTurns, servedBy)
 import Behavior.Parallel (firstOf)
 import Behavior.STM (atomically)
-import Behavior.Time (timeout)
 
 -- $setup
 -- >>> import Behavior
@@ -150,7 +149,7 @@ polling fleet = forever $ do
   let wait = case next of
         Right (Right (Just seconds, _)) -> min (pollEvery chosen) (max 0.05 seconds)
         _ -> pollEvery chosen
-  timeout wait (atomically (readTVar (pollNow fleet) >>= check)) ? pure ()
+  betweenTurns wait (readTVar (pollNow fleet) >>= check)
  where
   chosen = options fleet
 

@@ -77,10 +77,10 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
  where
   options = lineOptions line
   go said pause limit = do
-    begun <- newTVarIO Nothing
+    usedFrom <- newTVarIO Nothing
     ended <- tryAny . opening database limit $ \session -> do
       limited (max limit (answerWithin options)) (prepare session)
-      now >>= atomically . writeTVar begun . Just
+      now >>= atomically . writeTVar usedFrom . Just
       used said session
     atomically $ do
       why <- case ended of
@@ -91,8 +91,7 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
           pure (Just (displayException why))
       before <- readTVar said
       unless (isNothing why || why == before) (writeTVar said why >> say why)
-    end <- now
-    lasted <- maybe 0 (end -) <$> readTVarIO begun
+    lasted <- maybe (const 0) subtract <$> readTVarIO usedFrom <*> now
     sleep pause
     if lasted > longestPause options
       then go said (firstPause options) firstLimit
@@ -109,7 +108,9 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
     InUse -> retry
     _ -> writeTVar (place line) Nowhere
   isFleetFault why = isJust (fromException why :: Maybe FleetFault)
-  isSlow ended = not (null [() | Left why <- [ended], Just (TooSlow _) <- [fromException why]])
+  isSlow = \case
+    Left why | Just (TooSlow _) <- fromException why -> True
+    _ -> False
 
 -- | How long a server has to answer who connects, in seconds. (Libpq knows no limit that is shorter than the first.)
 firstLimit, longestLimit :: Seconds
