@@ -15,7 +15,7 @@ import Control.Exception (finally, uninterruptibleMask_)
 import Behavior.Internal.Concurrent.Nursery (fork, scoped)
 import Behavior.Internal.Concurrent.Parallel (firstOf)
 import Behavior.Internal.Core.Failure (Behavior)
-import Behavior.Internal.Seam.Runtime (Seconds, atomically, rest)
+import Behavior.Internal.Seam.Runtime (Seconds, atomically, sleepWithOwnTimer)
 
 -- | Runs the behaviour beside a service, which goes on until the behaviour has ended, cleanup included: what stops a
 -- robot must still reach it. (An operator requests the stop of all its branches together. So the thread of the
@@ -30,4 +30,4 @@ servedBy service behavior = do
 
 -- | What a service does between two turns of its work: it waits for that many seconds, or for the transaction.
 betweenTurns :: Seconds -> STM () -> Behavior ()
-betweenTurns seconds sooner = firstOf [rest seconds, atomically sooner]
+betweenTurns seconds sooner = firstOf [sleepWithOwnTimer seconds, atomically sooner]

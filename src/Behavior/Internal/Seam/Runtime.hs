@@ -26,7 +26,7 @@ module Behavior.Internal.Seam.Runtime
   , Seconds (..)
   , now
   , sleep
-  , rest
+  , sleepWithOwnTimer
   , sleepUntil
   , sleepToSlot
 
@@ -148,8 +148,9 @@ sleep seconds = do
 -- | 'sleep' of at most a day, for a thread that is hardly ever interrupted, in a process that may be idle otherwise:
 -- it has a timer of its own, so nothing is woken before its end. (Others are woken after 1, 2, 4 s and so on, and each
 -- time GHC's runtime ticks for a while, and looks for garbage.)
-rest :: Seconds -> IO ()
-rest seconds = inSimulation (threadDelay (ceiling (min 86400 seconds * 1000000))) (const (sleep seconds))
+sleepWithOwnTimer :: Seconds -> IO ()
+sleepWithOwnTimer seconds =
+  inSimulation (threadDelay (ceiling (min 86400 seconds * 1000000))) (const (sleep seconds))
 
 -- | Sleeps until a point in time on the clock of 'now'; returns at once if that has passed.
 --
