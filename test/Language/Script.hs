@@ -49,9 +49,11 @@ module Language.Script
 
 import Data.Foldable (toList)
 import Data.Functor.Const (Const (..))
+import Data.Ord (comparing)
 
 import Language.Operator (Choice (..), Ticks, holds)
 import qualified Language.Operator as O
+import Language.Same (unlessSame)
 
 type Name = String
 
@@ -67,7 +69,17 @@ data Program
   | -- | Delivers a message.
     Deliver
   | Op (O.Operator Signal Program)
-  deriving (Eq, Ord)
+  deriving (Eq)
+
+instance Ord Program where
+  compare = unlessSame (comparing content)
+   where
+    content = \case
+      Do name scripts -> Left (Left (name, scripts))
+      Pure value -> Left (Right value)
+      Sleep n -> Right (Left (Just n))
+      Deliver -> Right (Left Nothing)
+      Op o -> Right (Right o)
 
 -- | As it is written, with the patterns below.
 instance Show Program where

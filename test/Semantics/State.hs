@@ -38,8 +38,10 @@ module Semantics.State
 
 import Data.Map.Strict (Map)
 import Data.Maybe (isJust, maybeToList)
+import Data.Ord (comparing)
 import Data.Set (Set)
 
+import Language.Same (unlessSame)
 import Semantics.Filter
 import Semantics.Program
 
@@ -67,7 +69,10 @@ data Now = Now
   , abandoned :: [Thread]
   -- ^ Those that have not ended.
   }
-  deriving (Eq, Ord, Show)
+  deriving (Eq, Show)
+
+instance Ord Now where
+  compare = unlessSame (comparing (\(Now a b c d e f g) -> (a, b, c, d, e, f, g)))
 
 -- | What remains of a program that runs in a thread.
 data Running
@@ -148,7 +153,10 @@ data Operator
 
 -- | A branch of an operator.
 data Thread = Thread BranchLabel ThreadState
-  deriving (Eq, Ord, Show)
+  deriving (Eq, Show)
+
+instance Ord Thread where
+  compare = unlessSame (\(Thread a b) (Thread a' b') -> compare b b' <> unlessSame compare a a')
 
 data ThreadState
   = Live Request Running
