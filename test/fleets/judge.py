@@ -5,9 +5,7 @@ judge.py ROW...: FLEET is the folder of the server and its socket, BUILT that of
 A line for each claim; the exit code is 1 if any has failed. SEED chooses what is random.
 """
 
-import concurrent.futures
 import sys
-import time
 
 import agreeing
 import away
@@ -15,31 +13,15 @@ import cost
 import dying
 import harmed
 import keeping
-from claims import claim, end
+from claims import end, run_rows
 from fleet import SEED, kill_all, running
 
-ROWS = {name: row for module in (dying, away, cost, agreeing, harmed, keeping) for name, row in vars(module).items()
-        if name.startswith("row_")}
+MODULES = (dying, away, cost, agreeing, harmed, keeping)
 
 # These run beside another row, which mostly waits: they have a server of their own, or databases.
 BESIDE = {7: 3, 10: 3, 6: 8}
 
-
-def judged(row):
-    begun = time.monotonic()
-    try:
-        ROWS[f"row_{row}"]()
-    except Exception as problem:
-        claim(row, "the row ended", f"{type(problem).__name__}: {problem}".splitlines()[0], "well", False)
-    if row not in BESIDE:
-        kill_all(running)  # those that a row that did not end has left
-    print(f"row {row}: it took {time.monotonic() - begun:.0f} s", flush=True)
-
-
 print(f"SEED={SEED}", flush=True)
-chosen = list(map(int, sys.argv[1:]))
-for row in chosen:
-    if BESIDE.get(row) not in chosen:
-        with concurrent.futures.ThreadPoolExecutor() as together:
-            list(together.map(judged, [row, *(other for other in chosen if BESIDE.get(other) == row)]))
+# (What a row that did not end has left is killed.)
+run_rows(MODULES, list(map(int, sys.argv[1:])), BESIDE, after=lambda row: kill_all(running))
 end()
