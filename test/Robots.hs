@@ -5,6 +5,8 @@
 -- @test/robots/judge.py@ says how each row went.
 --
 -- > robots 2 3 4
+--
+-- Two of these programs can run at once, if no row is of both.
 module Main (main) where
 
 import Control.Exception (displayException)
@@ -51,8 +53,9 @@ rows =
 main :: IO ()
 main = do
   arguments <- map read <$> getArgs
-  unless (all (`elem` map fst rows) arguments) $ die ("robots: the rows are " ++ unwords (map (show . fst) rows))
-  campaign <- newCampaign
+  unless (not (null arguments) && all (`elem` map fst rows) arguments) $
+    die ("robots: the rows are " ++ unwords (map (show . fst) rows))
+  campaign <- newCampaign (minimum arguments)
   runBehavior . for_ rows $ \(n, row) -> when (n `elem` arguments) (runRow campaign n (row campaign))
 
 -- | Writes how the row ended, and by how much a thread that slept beside it was late at most: so late may all that is

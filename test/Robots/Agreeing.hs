@@ -19,7 +19,7 @@ import Robots.Goals
 import Ros.Cases
 
 agreeing :: Campaign -> Behavior ()
-agreeing campaign = withBridge campaign 9090 $ \bridge way -> do
+agreeing campaign = withBridge campaign 1 $ \bridge way -> do
   awaitServers campaign 16 way ["/fast", "/stubborn", "/steady", "/brief", "/picky"]
   for_ cases $ \it -> do
     let host ros = Host ros (endBridge sigKILL bridge) (startBridge campaign bridge)

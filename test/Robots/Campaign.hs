@@ -52,19 +52,24 @@ import Behavior.Time (timeout)
 data Campaign = Campaign
   { believed :: MVar Handle
   , orders :: IORef Int
+  , ports :: Int
+  -- ^ Its bridges have those after this one.
   , command :: [String]
   , folder :: FilePath
   , isLong :: Bool
   }
 
 -- | From the environment: @ROBOTS@ is the folder, @ROBOTS_BRIDGE@ the command that starts a bridge, and @LONG@ is set
--- for the long counts.
-newCampaign :: IO Campaign
-newCampaign = do
+-- for the long counts. Another program that runs at the same time begins with another row: so it has other ports, and
+-- other orders.
+newCampaign :: Row -> IO Campaign
+newCampaign first = do
   place <- getEnv "ROBOTS"
   handle <- openFile (place ++ "/believed") AppendMode
   hSetBuffering handle LineBuffering
-  Campaign <$> newMVar handle <*> newIORef 0 <*> (words <$> getEnv "ROBOTS_BRIDGE") <*> pure place <*> longCounts
+  beliefs <- newMVar handle
+  nextOrder <- newIORef (100000 * first)
+  Campaign beliefs nextOrder (9000 + 10 * first) . words <$> getEnv "ROBOTS_BRIDGE" <*> pure place <*> longCounts
  where
   longCounts = maybe False (not . null) <$> lookupEnv "LONG"
 
@@ -91,12 +96,12 @@ data Bridge = Bridge
   , running :: IORef (Maybe ProcessHandle)
   }
 
--- | A bridge on that port while the behaviour runs.
+-- | The n-th bridge, from 1, while the behaviour runs.
 withBridge :: Campaign -> Int -> (Bridge -> Transport -> Behavior a) -> Behavior a
-withBridge campaign port use =
-  bracket (Bridge port <$> newIORef Nothing) (endBridge sigKILL) $ \bridge -> do
+withBridge campaign n use =
+  bracket (Bridge (ports campaign + n) <$> newIORef Nothing) (endBridge sigKILL) $ \bridge -> do
     startBridge campaign bridge
-    use bridge (rosbridge ("ws://127.0.0.1:" ++ show port))
+    use bridge (rosbridge ("ws://127.0.0.1:" ++ show (onPort bridge)))
 
 -- | While the behaviour runs, a bridge that is none, in a process of its own, which reads this one's memory:
 -- @test/robots/bridge.py@ with these arguments.

@@ -22,7 +22,7 @@ import Robots.Goals
 
 -- | Cancelled at random instants, half of them on a server that looks every 10 ms, half on one that looks every 150.
 atRandomInstants :: Campaign -> Behavior ()
-atRandomInstants campaign = withBridge campaign 9090 $ \_ bridge -> withRos bridge $ \ros -> do
+atRandomInstants campaign = withBridge campaign 1 $ \_ bridge -> withRos bridge $ \ros -> do
   awaitServers campaign 2 bridge ["/fast", "/slow"]
   let n = if isLong campaign then 500 else 200
       some name = replicateM_ n $ do
@@ -33,7 +33,7 @@ atRandomInstants campaign = withBridge campaign 9090 $ \_ bridge -> withRos brid
 -- | Cancelled within a millisecond of being sent, a hundred on each server. (Some are later, for threads wait for the
 -- processor: they are not counted.)
 atOnce :: Campaign -> Behavior ()
-atOnce campaign = withBridge campaign 9090 $ \_ bridge -> withRos bridge $ \ros -> do
+atOnce campaign = withBridge campaign 1 $ \_ bridge -> withRos bridge $ \ros -> do
   awaitServers campaign 3 bridge ["/fast", "/slow"]
   let some tries n name = unless (n == 0) $ do
         when (tries == 0) $ failWith ("too few goals were cancelled at once on " ++ name)
@@ -46,7 +46,7 @@ atOnce campaign = withBridge campaign 9090 $ \_ bridge -> withRos bridge $ \ros 
 
 -- | A server that never confirms: it works on each goal to its end.
 neverConfirmed :: Campaign -> Behavior ()
-neverConfirmed campaign = withBridge campaign 9090 $ \_ bridge -> replicateM_ (if isLong campaign then 10 else 2) $ do
+neverConfirmed campaign = withBridge campaign 1 $ \_ bridge -> replicateM_ (if isLong campaign then 10 else 2) $ do
   awaitServers campaign 4 bridge ["/stubborn"]
   before <- liveThreadCount
   withRos bridge $ \ros -> do

@@ -19,7 +19,7 @@ import Robots.Goals
 -- | Both have several goals at a time; one cancels many of its own, the other none. (Their links call their goals by
 -- the same names.)
 twoClients :: Campaign -> Behavior ()
-twoClients campaign = withBridge campaign 9090 $ \_ way -> withRos way $ \ours -> withRos way $ \theirs -> do
+twoClients campaign = withBridge campaign 1 $ \_ way -> withRos way $ \ours -> withRos way $ \theirs -> do
   awaitServers campaign 12 way ["/brief"]
   traverse_ awaitBridge [ours, theirs]
   let sending ros = plainly ros (replacing (fibonacci "/brief"))

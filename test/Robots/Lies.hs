@@ -87,7 +87,7 @@ floods campaign = do
           lost <- atomically (dropped inbox)
           note campaign 9
             ["reader" .= name, "handled" .= handled, "waiting" .= waited, "dropped" .= lost, "disorder" .= disorder]
-  withBridge campaign 9090 $ \_ way -> carried campaign way 250
+  withBridge campaign 1 $ \_ way -> carried campaign way 250
 
 -- | What a reader has taken: how many messages, how many of which were not later than the one before, the first number
 -- and the last.

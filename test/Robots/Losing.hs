@@ -31,7 +31,7 @@ import Robots.Goals
 
 -- | Killed in mid-goal, and while a goal is being cancelled.
 killed :: Campaign -> Behavior ()
-killed campaign = withBridge campaign 9090 $ \bridge way -> withRos way $ \ros -> do
+killed campaign = withBridge campaign 1 $ \bridge way -> withRos way $ \ros -> do
   let again kind server strike = do
         awaitServers campaign 5 way [server]
         awaitBridge ros
@@ -44,7 +44,7 @@ killed campaign = withBridge campaign 9090 $ \bridge way -> withRos way $ \ros -
 
 -- | Half-open: the bridge is there, and is silent.
 halfOpen :: Campaign -> Behavior ()
-halfOpen campaign = withBridge campaign 9090 $ \bridge way ->
+halfOpen campaign = withBridge campaign 1 $ \bridge way ->
   withRosWith defaultRosOptions {pingEvery = 0.5, pongWithin = 0.5} way $ \ros -> do
     awaitServers campaign 6 way ["/steady"]
     replicateM_ (if isLong campaign then 30 else 6) $ do
@@ -98,7 +98,7 @@ struck campaign row kind ros strike behavior = do
 -- bridge.
 restarted :: Campaign -> Behavior ()
 restarted campaign =
-  withBridge campaign 9090 $ \bridge way -> withBridge campaign 9091 $ \_ otherWay ->
+  withBridge campaign 1 $ \bridge way -> withBridge campaign 2 $ \_ otherWay ->
     withRos way $ \ros -> withRos otherWay $ \other ->
       for_ (if isLong campaign then [1 .. 30] else [1 .. 6 :: Int]) $ \n -> do
         for_ [way, otherWay] $ \each -> awaitServers campaign 7 each ["/steady"]
@@ -127,7 +127,7 @@ restarted campaign =
 -- | Two robots, each with its bridge and mission; the bridge of one dies, again and again.
 twoRobots :: Campaign -> Behavior ()
 twoRobots campaign =
-  withBridge campaign 9090 $ \bridge way -> withBridge campaign 9091 $ \_ otherWay ->
+  withBridge campaign 1 $ \bridge way -> withBridge campaign 2 $ \_ otherWay ->
     withRos way $ \ros -> withRos otherWay $ \other -> do
       awaitServers campaign 13 otherWay ["/brief"]
       let n = if isLong campaign then 30 else 10

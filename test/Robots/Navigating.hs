@@ -21,7 +21,7 @@ import Robots.Goals
 
 -- | Goals that succeed, that are aborted, rejected, stopped and replaced.
 navigating :: Campaign -> Behavior ()
-navigating campaign = withBridge campaign 9090 $ \_ bridge -> do
+navigating campaign = withBridge campaign 1 $ \_ bridge -> do
   awaitReached campaign 17 bridge [("/navigate_to_pose", \ros reach -> driving campaign ros reach (place 1))]
   withRos bridge $ \ros -> do
     awaitBridge ros

@@ -22,7 +22,7 @@ import Robots.Campaign
 import Robots.Goals
 
 silences :: Campaign -> Behavior ()
-silences campaign = withBridge campaign 9090 $ \_ bridge -> do
+silences campaign = withBridge campaign 1 $ \_ bridge -> do
   awaitServers campaign 8 bridge ["/steady"]
   replicateM_ (if isLong campaign then 20 else 5) $ do
     for_ ["/nothing", "/nowhere"] $ \name ->
