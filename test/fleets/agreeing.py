@@ -1,5 +1,6 @@
 """Row 7 of make fleets: what the fake database does is what PostgreSQL does; and days of a fleet on it, simulated."""
 
+import concurrent.futures
 import os
 import re
 import subprocess
@@ -11,6 +12,13 @@ LONG = "LONG" in os.environ
 
 
 def row_7():
+    with concurrent.futures.ThreadPoolExecutor() as beside:
+        both = [beside.submit(agreed), beside.submit(simulated)]
+    for part in both:
+        part.result()
+
+
+def agreed():
     folder = another_server("agreed")
     psql("create database fleet owner owner", user="postgres", database="postgres", host=folder)
     owner, robot = (address(user=user, host=folder) for user in ("owner", "robot"))
@@ -22,6 +30,9 @@ def row_7():
     claim(7, "sequences of requests to PostgreSQL and to the fake database, which agree",
           tried[1] if tried else said, wanted, bool(tried) and int(tried[1]) == wanted)
     server("-m", "immediate", "stop", data="agreed/data")
+
+
+def simulated():
     wanted = 100000 if LONG else 1000
     said = run("days", str(SEED), str(wanted))
     tried = re.search(r"(\d+) schedules, (\d+) scheduling points", said)

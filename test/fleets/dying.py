@@ -237,16 +237,18 @@ class Phase:
         while events:
             # At once, or later: most stay for a moment, some for longer than the term.
             least = 0.05 if events[-1] == "cut" else chance.choice([0, 0, 0, 0.3])
-            last, since = door.inside()
-            wanted = lambda: door.inside() != (last, since) and door.inside()[0] and \
-                time.monotonic() - door.inside()[1] >= least
+            last = door.inside()
+
+            def another():
+                inside = door.inside()
+                return inside != last and inside[0] and time.monotonic() - inside[1] >= least and inside
+
             try:
-                until(wanted, 20, "a robot that passes", step=0.002)
+                name, since = until(another, 20, "a robot that passes", step=0.002)
             except TimeoutError:
                 tell(door, robots)
                 raise
-            name, since = door.inside()
-            if name and self.struck(events[-1], door, robots[name], since):
+            if self.struck(events[-1], door, robots[name], since):
                 events.pop()
 
     def struck(self, kind, door, robot, since):
