@@ -60,12 +60,12 @@ data Campaign = Campaign
   }
 
 -- | From the environment: @ROBOTS@ is the folder, @ROBOTS_BRIDGE@ the command that starts a bridge, and @LONG@ is set
--- for the long counts. Another program that runs at the same time begins with another row: so it has other ports, and
--- other orders.
+-- for the long counts. Another program that runs at the same time begins with another row: so it has another file, other
+-- ports and other orders.
 newCampaign :: Row -> IO Campaign
 newCampaign first = do
   place <- getEnv "ROBOTS"
-  handle <- openFile (place ++ "/believed") AppendMode
+  handle <- openFile (place ++ "/believed-" ++ show first) AppendMode
   hSetBuffering handle LineBuffering
   beliefs <- newMVar handle
   nextOrder <- newIORef (100000 * first)

@@ -1,10 +1,13 @@
 """Says how each row went: compares what the program believes with what the action servers have recorded.
 
 judge.py FOLDER ROW...: the folder has the files "record" (of the servers), "lies" (of bridges that are none, in
-bridge.py) and "believed" (of the program). A line for each claim; the exit code is 1 if any has failed.
+bridge.py) and "believed-ROW" (of each program, by its first row). A line for each claim; the exit code is 1 if any has
+failed.
 """
 
 import collections
+import fileinput
+import glob
 import json
 import math
 import os
@@ -23,7 +26,7 @@ for line in sorted(open(FOLDER + "/record"), key=lambda line: float(line.split()
 
 # What the program believes, by row.
 believed = collections.defaultdict(list)
-for line in open(FOLDER + "/believed"):
+for line in fileinput.input(glob.glob(FOLDER + "/believed-*")):
     entry = json.loads(line)
     believed[entry["row"]].append(entry)
 
