@@ -60,8 +60,8 @@ data Campaign = Campaign
   }
 
 -- | From the environment: @ROBOTS@ is the folder, @ROBOTS_BRIDGE@ the command that starts a bridge, and @LONG@ is set
--- for the long counts. Another program that runs at the same time begins with another row: so it has another file, other
--- ports and other orders.
+-- for the long counts. Another program that runs at the same time begins with another row: so its file, its ports and
+-- its orders are others.
 newCampaign :: Row -> IO Campaign
 newCampaign first = do
   place <- getEnv "ROBOTS"
