@@ -155,6 +155,7 @@ data Operator
 data Thread = Thread BranchLabel ThreadState
   deriving (Eq, Show)
 
+-- | (Threads with the same label are the usual ones: it is compared last.)
 instance Ord Thread where
   compare = unlessSame (\(Thread a b) (Thread a' b') -> compare b b' <> unlessSame compare a a')
 

@@ -6,7 +6,6 @@ failed.
 """
 
 import collections
-import fileinput
 import glob
 import json
 import math
@@ -26,9 +25,10 @@ for line in sorted(open(FOLDER + "/record"), key=lambda line: float(line.split()
 
 # What the program believes, by row.
 believed = collections.defaultdict(list)
-for line in fileinput.input(glob.glob(FOLDER + "/believed-*")):
-    entry = json.loads(line)
-    believed[entry["row"]].append(entry)
+for name in glob.glob(FOLDER + "/believed-*"):
+    for line in open(name):
+        entry = json.loads(line)
+        believed[entry["row"]].append(entry)
 
 # What each bridge that is none has recorded, by what it was started for.
 lies_of = collections.defaultdict(list)
