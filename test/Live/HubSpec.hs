@@ -7,7 +7,7 @@ module Live.HubSpec (spec) where
 
 import Control.Concurrent.Async (concurrently_, mapConcurrently_, race_, withAsync)
 import Control.Concurrent.STM
-import Control.Exception (Handler (..), IOException, bracket, catches, finally, try)
+import Control.Exception (Handler (..), IOException, bracket, catches, finally)
 import Control.Monad (forM_, forever, replicateM_, void, (>=>))
 import Data.Aeson (FromJSON, Value (..), encode, object, toJSON, withObject, (.:), (.=))
 import qualified Data.Aeson.Key as Key
@@ -364,8 +364,7 @@ fieldMaybe :: FromJSON a => Text -> Value -> Maybe a
 fieldMaybe name = parseMaybe (withObject "message" (.: Key.fromText name))
 
 untilClosed :: Websockets.Connection -> IO ()
-untilClosed connection =
-  void (try (forever (nextOfAny connection)) :: IO (Either Websockets.ConnectionException ()))
+untilClosed connection = void (unlessClosed (forever (nextOfAny connection)))
 
 -- | The status of the answer to a request for a websocket, with these headers, too; without them for the file.
 statusOf :: Int -> Char8.ByteString -> [(Char8.ByteString, Char8.ByteString)] -> IO Char8.ByteString

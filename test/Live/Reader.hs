@@ -12,6 +12,7 @@ module Live.Reader
   , freePort
   , reachable
   , withConnection
+  , unlessClosed
 
     -- * Messages
   , next
@@ -24,7 +25,7 @@ module Live.Reader
   ) where
 
 import Control.Concurrent (yield)
-import Control.Exception (IOException, bracket, evaluate, onException, try)
+import Control.Exception (Handler (..), IOException, bracket, catches, evaluate, onException, try)
 import Control.Monad (forM_)
 import Data.Aeson (Value, eitherDecode, encode, object, (.=))
 import qualified Data.Aeson.Key as Key
@@ -36,6 +37,7 @@ import qualified Data.Text as Text
 import Network.Socket
 import Network.Wai.Handler.Warp (openFreePort)
 import qualified Network.WebSockets as Websockets
+import System.IO.Error (isResourceVanishedError)
 import Test.Hspec (shouldBe, shouldReturn)
 
 import Behavior.Trace
@@ -118,3 +120,12 @@ withConnection port = bracket open close
     s <- socket AF_INET Stream defaultProtocol
     connect s (SockAddrInet (fromIntegral port) (tupleToHostAddress (127, 0, 0, 1))) `onException` close s
     pure s
+
+-- | 'Nothing': the connection was closed. (Of one that is closed before all has been read, the system says that it was
+-- reset.)
+unlessClosed :: IO a -> IO (Maybe a)
+unlessClosed act =
+  (Just <$> act) `catches`
+    [ Handler $ \e -> Nothing <$ evaluate (e :: Websockets.ConnectionException)
+    , Handler $ \e -> if isResourceVanishedError e then pure Nothing else ioError e
+    ]

@@ -6,7 +6,7 @@ module Live.ServerSpec (spec) where
 
 import Control.Concurrent.Async (concurrently, mapConcurrently, wait, withAsync)
 import Control.Concurrent.STM
-import Control.Exception (Handler (..), catches, evaluate)
+import Control.Exception (catch)
 import Control.Monad (forM_, replicateM_, (>=>))
 import Data.Aeson (Value (..), encode, object, (.=))
 import Data.Bifunctor (bimap)
@@ -20,7 +20,6 @@ import Network.Socket hiding (listen)
 import Network.Socket.ByteString (recv, sendAll)
 import Network.Wai.Handler.Warp (testWithApplication)
 import qualified Network.WebSockets as Websockets
-import System.IO.Error (isResourceVanishedError)
 import System.Timeout (timeout)
 import Test.Hspec hiding (before)
 
@@ -185,17 +184,12 @@ tell shown new = do
 attached :: Int -> Websockets.Headers -> Value -> IO (Either String String)
 attached port headers said = orWhyNot (message <$> attachedBy port headers said next)
 
--- What comes; or the status of a refused handshake, or that the connection was closed. (Of one that is closed before
--- all has been read, the system says that it was reset.)
+-- What comes; or the status of a refused handshake, or that the connection was closed.
 orWhyNot :: IO a -> IO (Either String a)
 orWhyNot act =
-  (Right <$> act) `catches`
-    [ Handler $ \e -> pure . Left $ case e of
-        Websockets.MalformedResponse response _ -> show (Websockets.responseCode response)
-        other -> show other
-    , Handler $ \e -> Left "closed" <$ evaluate (e :: Websockets.ConnectionException)
-    , Handler $ \e -> if isResourceVanishedError e then pure (Left "closed") else ioError e
-    ]
+  (maybe (Left "closed") Right <$> unlessClosed act) `catch` \e -> pure . Left $ case e of
+    Websockets.MalformedResponse response _ -> show (Websockets.responseCode response)
+    other -> show other
 
 firstFrom :: Int -> Websockets.Headers -> Value -> IO String
 firstFrom port headers said = either id id <$> attached port headers said
