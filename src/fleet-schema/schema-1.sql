@@ -493,7 +493,8 @@ begin
   perform fleet.close(fleet.running(a_task, a_lease), 'done', coalesce(a_result, 'null'), null);
 end $$;
 
--- Of these starts, those that are completed now. (Those of which the lease is lost are not.)
+-- Of these starts, those that are completed now. (Those of which the lease is lost are not. Most tasks are not watched,
+-- nor periodic: fleet.close of all of those is one statement.)
 create function fleet.complete_some(some_tasks bigint[], some_leases bigint[], some_results jsonb[])
 returns table (task bigint, lease bigint) language plpgsql as $$
 #variable_conflict use_column
@@ -502,13 +503,21 @@ declare
 begin
   perform fleet.require_epoch();
   for t in
-    select f as row, said.result from fleet.task f
-      join unnest(some_tasks, some_leases, some_results) as said (task, lease, result) using (task, lease)
-    where f.state = 'running' order by f.task for update of f
+    with held as (
+      select f.task, f.lease, not f.is_watched and f.period is null as is_plain, coalesce(said.result, 'null') as result
+      from fleet.task f
+        join unnest(some_tasks, some_leases, some_results) as said (task, lease, result) using (task, lease)
+      where f.state = 'running' order by f.task for update of f),
+    closed as (
+      update fleet.task f set state = 'done', result = held.result, ended = at, wakes = at + f.kept
+      from held, fleet.clock() at where f.task = held.task and held.is_plain)
+    select * from held
   loop
-    perform fleet.close(t.row, 'done', coalesce(t.result, 'null'), null);
-    task := (t.row).task;
-    lease := (t.row).lease;
+    if not t.is_plain then
+      perform fleet.close(f, 'done', t.result, null) from fleet.task f where f.task = t.task;
+    end if;
+    task := t.task;
+    lease := t.lease;
     return next;
   end loop;
 end $$;
