@@ -53,7 +53,6 @@ import Ros.Cases (servers)
 import qualified Ros.CasesSpec
 import qualified Ros.TlsSpec
 import qualified Ros.WebsocketSpec
-import qualified Sim.AwaitedSpec
 import qualified Sim.ClaimSpec
 import qualified Sim.DeliverySpec
 import qualified Sim.EndSpec
@@ -112,7 +111,6 @@ main = orBridge servers . hspec $ do
   describe "Promises" Behavior.PromisesSpec.spec
   describe "Cancellation stress" Behavior.CancellationStressSpec.spec
   describe "Simulation" $ do
-    Sim.AwaitedSpec.spec
     Sim.SimulateSpec.spec
     Sim.DeliverySpec.spec
     Sim.EndSpec.spec

@@ -17,11 +17,10 @@ module Behavior.Internal.Sim.Enabled
   , receives
   , Receives (..)
   , wakeUntil
-  , unwatchAll
   ) where
 
 import Control.Exception (MaskingState (..))
-import Control.Monad (foldM, unless, when)
+import Control.Monad (filterM, unless, when)
 import Data.Foldable (for_)
 import Data.IORef
 import qualified Data.IntMap.Strict as IntMap
@@ -30,7 +29,6 @@ import qualified Data.Map.Strict as Map
 import Data.Maybe (isJust)
 
 import Behavior.Internal.Core.Seconds (Seconds)
-import Behavior.Internal.Sim.Awaited (canCommit, hasWaited, unwatch)
 import Behavior.Internal.Sim.State
 
 -- | Puts a task into the right map, after a change of its position or of its exceptions.
@@ -44,7 +42,7 @@ file sim task = do
     _ | certain -> intoReady
     Unstarted -> intoReady
     Before _ op -> case op of
-      Transaction it -> modifyIORef' (awaiting sim) (IntMap.insert (taskNumber task) (Waiter task it))
+      Transaction _ _ -> modifyIORef' (awaiting sim) (IntMap.insert (taskNumber task) task)
       Moment t -> do
         due <- possible sim op
         if due then intoReady else modifyIORef' (sleepers sim) (Map.insert (t, taskNumber task) task)
@@ -67,20 +65,22 @@ unfile :: Sim -> Task -> IO ()
 unfile sim task = do
   modifyIORef' (ready sim) (Map.delete (taskNumber task))
   readIORef (blockedAt task) >>= \case
-    Before _ (Transaction it) -> modifyIORef' (awaiting sim) (IntMap.delete (taskNumber task)) >> unwatch it
+    Before _ (Transaction _ _) -> modifyIORef' (awaiting sim) (IntMap.delete (taskNumber task))
     Before _ (Moment t) -> modifyIORef' (sleepers sim) (Map.delete (t, taskNumber task))
     _ -> pure ()
 
 -- | The enabled tasks.
 enabled :: Sim -> IO (Map Int Task)
 enabled sim = do
-  n <- readIORef (commits sim)
   certain <- readIORef (ready sim)
-  let add others (Waiter task it) = do
-        is <- canCommit n it
-        pure (if is then (taskNumber task, task) : others else others)
-  others <- readIORef (awaiting sim) >>= foldM add []
-  pure (if null others then certain else Map.union (Map.fromDistinctDescList others) certain)
+  waiting <- readIORef (awaiting sim)
+  enabledTasks <- filterM (canCommit . snd) (IntMap.toAscList waiting)
+  pure (Map.union (Map.fromDistinctAscList enabledTasks) certain)
+ where
+  canCommit task =
+    readIORef (blockedAt task) >>= \case
+      Before _ op -> possible sim op
+      _ -> pure False
 
 -- | Whether the operation can be done now.
 possible :: Sim -> Operation -> IO Bool
@@ -89,7 +89,14 @@ possible sim = \case
   Throwing _ _ -> pure True
   Moment t -> (t <=) <$> readIORef (time sim)
   Delivery _ p -> readIORef (released p)
-  Transaction it -> readIORef (commits sim) >>= \n -> canCommit n it
+  Transaction wouldRun look -> do
+    EnabledCache looked was waited <- readIORef look
+    n <- readIORef (commits sim)
+    if looked == n
+      then pure was
+      else do
+        is <- wouldRun
+        is <$ writeIORef look (EnabledCache n is (waited || not is))
 
 -- | When a task receives an exception that is thrown to it now.
 data Receives
@@ -112,11 +119,18 @@ receives sim target = do
     Before Unmasked _ | not arrived -> pure AtOnce
     Before MaskedInterruptible op | not (arrived || waiting) -> do
       is <- possible sim op
-      waited <- case op of
-        Transaction it -> hasWaited it
-        _ -> pure False
+      waited <- hasWaited op
       pure (if is && not waited then Later else AtOnce)
     _ -> pure Later
+
+-- | Whether the operation is a transaction that had to wait. A thread whose transaction is woken
+-- by another capability counts as blocked until it runs again, and receives an exception that is
+-- thrown meanwhile. (A thread that waits at an 'Control.Concurrent.MVar', as a sleeper does, does
+-- not receive it.)
+hasWaited :: Operation -> IO Bool
+hasWaited = \case
+  Transaction _ look -> (\(EnabledCache _ _ waited) -> waited) <$> readIORef look
+  _ -> pure False
 
 -- | The virtual time has advanced to this moment: makes the sleepers that are due ready.
 wakeUntil :: Sim -> Seconds -> IO ()
@@ -125,7 +139,3 @@ wakeUntil sim t = do
   unless (Map.null due) $ do
     writeIORef (sleepers sim) others
     for_ (Map.elems due) $ \task -> modifyIORef' (ready sim) (Map.insert (taskNumber task) task)
-
--- | Ends the watchers of all transactions, so that each is tried again.
-unwatchAll :: Sim -> IO ()
-unwatchAll sim = readIORef (awaiting sim) >>= mapM_ (\(Waiter _ it) -> unwatch it)

@@ -21,7 +21,7 @@ module Behavior.Internal.Sim.Scheduler
 import Control.Applicative ((<|>))
 import Control.Concurrent
 import Control.Concurrent.Async (Async, asyncOnWithUnmask, asyncThreadId)
-import Control.Concurrent.STM (STM, orElse)
+import Control.Concurrent.STM (STM, catchSTM, orElse, throwSTM)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception
 import Control.Monad (unless, void, when)
@@ -34,7 +34,6 @@ import Foreign.StablePtr (newStablePtr)
 
 import Behavior.Internal.Core.Backend
 import Behavior.Internal.Core.Property (Property)
-import Behavior.Internal.Sim.Awaited (awaited)
 import Behavior.Internal.Sim.Coverage (canStart, starts)
 import Behavior.Internal.Sim.Enabled
 import Behavior.Internal.Sim.Pending
@@ -134,21 +133,29 @@ transaction sim act = do
   recordDetail sim Transacts
   quick <- keepsTurn sim
   done <- if quick then tried else pure Nothing
-  maybe (awaited (capability sim) act >>= waiting) pure done
+  maybe (newIORef (EnabledCache (-1) False False) >>= waiting) pure done
  where
   tried = do
     result <- STM.atomically ((Just <$> act) `orElse` pure Nothing)
     when (isJust result) (committed sim)
     pure result
-  waiting it = do
-    reschedule sim (Transaction it)
+  waiting look = do
+    reschedule sim (Transaction wouldRun look)
     -- The transaction commits now, unless something outside of the simulation has just made
     -- that impossible, or the run has ended.
     tried >>= \case
       Just a -> pure a
       Nothing -> do
         ending <- readIORef (unwinding sim)
-        if ending then throwIO Unwind else waiting it
+        if ending then throwIO Unwind else waiting look
+  wouldRun =
+    STM.atomically $
+      ((act >> throwSTM Undo) `catchSTM` \(_ :: SomeException) -> pure True) `orElse` pure False
+
+data Undo = Undo
+  deriving (Show)
+
+instance Exception Undo
 
 -- | Gives the turn to the task that the policy chooses, and returns in the caller's next turn.
 reschedule :: Sim -> Operation -> IO ()

@@ -28,7 +28,6 @@ import Behavior.Internal.Core.Property (Property)
 import Behavior.Internal.Core.SafeText (settledText)
 import Behavior.Internal.Core.Seconds (duration)
 import Behavior.Internal.Sim.Coverage (Reached)
-import Behavior.Internal.Sim.Enabled (unwatchAll)
 import Behavior.Internal.Sim.Pending
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Scheduler
@@ -167,7 +166,6 @@ unwind sim verdict = do
   writeIORef (nextDecisionAt sim) minBound
   when keptTurn recall
   readIORef (tasks sim) >>= mapM_ (withdrawAll sim)
-  unwatchAll sim
   writeIORef (driverRuns sim) True
   next
  where

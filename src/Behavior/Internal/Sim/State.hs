@@ -21,7 +21,7 @@ module Behavior.Internal.Sim.State
   , newTask
   , Position (..)
   , Operation (..)
-  , Waiter (..)
+  , EnabledCache (..)
   , Pending (..)
   , Unwind (..)
 
@@ -50,7 +50,6 @@ import Behavior.Internal.Core.Backend
 import Behavior.Internal.Core.SafeText (safeShow)
 import Behavior.Internal.Core.Seconds (Seconds)
 import Behavior.Internal.Core.Stop (Stop)
-import Behavior.Internal.Sim.Awaited (Awaited)
 import Behavior.Internal.Sim.Coverage (Reached, nothingYet)
 import Behavior.Internal.Sim.Policy
 import Behavior.Internal.Sim.Types
@@ -70,7 +69,7 @@ data Sim = Sim
   -- ^ The same without helper tasks, by their threads.
   , ready :: !(IORef (Map Int Task))
   -- ^ The tasks that are known to be enabled: a choice does not check them again.
-  , awaiting :: !(IORef (IntMap Waiter))
+  , awaiting :: !(IORef (IntMap Task))
   -- ^ The tasks before a transaction: other tasks can make it possible or impossible.
   , sleepers :: !(IORef (Map (Seconds, Int) Task))
   -- ^ The tasks that sleep, by the time at which they are due.
@@ -134,7 +133,7 @@ data Position
 -- | The next operation of a task, as far as it determines whether the task is enabled.
 data Operation
   = AlwaysEnabled
-  | Transaction !Awaited
+  | Transaction (IO Bool) !(IORef EnabledCache)
   | Moment !Seconds
   | -- | A helper task is about to throw.
     Throwing !Task SomeException
@@ -152,8 +151,9 @@ data Pending = Pending
   -- ^ The task that waits until it is raised; 'Nothing' if a helper task threw it.
   }
 
--- | A task and the transaction that it waits for.
-data Waiter = Waiter !Task !Awaited
+-- | The number of commits when a transaction was last tried, whether it could commit then,
+-- and whether in any try it could not: then its task has begun to wait.
+data EnabledCache = EnabledCache !Int !Bool !Bool
 
 -- | The exception that unwinds a task when the run has ended.
 data Unwind = Unwind

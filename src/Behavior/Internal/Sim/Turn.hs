@@ -123,11 +123,10 @@ advanceTime sim = do
     True <$ wakeUntil sim t
 
   -- No task can enable another. A thread outside of the simulation, started by the user, may
-  -- just have enabled one. (If it is on another capability, the watchers do not know that yet.)
+  -- just have enabled one.
   wokenFromOutside 0 = pure False
   wokenFromOutside n = do
     committed sim
-    unwatchAll sim
     enabledTasks <- enabled sim
     if Map.null enabledTasks then osSleep 1000 >> wokenFromOutside (n - 1) else pure True
 
@@ -165,7 +164,7 @@ waitingTasks sim these = do
     pure [Waiting (Label "interrupt" "helper") (toReceive target) | p <- late, isNothing (sender p)]
   toReceive target = show (taskLabel target) ++ " to receive an exception"
   reason alive task = \case
-    Before _ (Transaction _) ->
+    Before _ (Transaction _ _) ->
       case [show (taskLabel t) | t <- alive, parent t == taskNumber task, isJust (taskThread t)] of
         [] -> "a transaction"
         branches -> "a transaction (its branches: " ++ commas branches ++ ")"
