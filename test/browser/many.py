@@ -103,11 +103,15 @@ def killed(browser, hub, robots, stack):
     claim(14, "killed: what it did, and its last interruption", shown["Ann"]["why"], before["why"],
           (shown["Ann"]["runs"], shown["Ann"]["why"]) == (before["runs"], before["why"]))
     with Browser() as late:
+        # (The hub tries again and again, and says why in vain: so the other page is read before and after.)
+        there = [cards(browser)["Ann"]]
         late.open(hub)
         until(lambda: len(cards(late)) == 5, 5, "five cards")
         at_once = cards(late)["Ann"]
-        claim(14, "killed: a page that is opened later", at_once["state"], shown["Ann"]["state"],
-              [at_once[k] for k in ("state", "runs", "why")] == [shown["Ann"][k] for k in ("state", "runs", "why")])
+        there.append(cards(browser)["Ann"])
+        same = [all(at_once[k] == card[k] for k in ("state", "runs", "why")) for card in there]
+        claim(14, "killed: a page that is opened later", at_once["state"],
+              " or ".join(dict.fromkeys(card["state"] for card in there)), any(same))
     robots["Ann"].process.wait()
     robots["Ann"] = stack.enter_context(Robot("work", port=robots["Ann"].port))
     at_most(14, "started again: until the page says so", becomes(browser, "Ann", "live", 10), 3)

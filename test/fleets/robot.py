@@ -65,18 +65,23 @@ class Fleet:
         if connection is not None:
             connection.close()
 
-    def rest(self, seconds):
-        """Until there may be a notice, and at most that long."""
+    def rest(self, seconds, notice=None):
+        """Until there is that notice, and at most that long."""
+        ends = time.monotonic() + seconds
         if self.connection is None:
             time.sleep(min(0.1, seconds))
-        elif not self.connection.notifies:
-            select.select([self.connection], [], [], seconds)
+        while self.connection is not None and not self.has_come(notice) and time.monotonic() < ends:
+            select.select([self.connection], [], [], max(0, ends - time.monotonic()))
             try:
                 self.connection.poll()
             except psycopg2.Error:
                 self.leave()
-        if self.connection is not None:
-            self.connection.notifies.clear()
+
+    def has_come(self, notice):
+        """Whether there was that notice since it was asked last."""
+        has = notice in [it.payload for it in self.connection.notifies]
+        self.connection.notifies.clear()
+        return has
 
 
 def carry_orders(fleet, term):
@@ -90,7 +95,7 @@ def carry_orders(fleet, term):
                               "%s, %s)", ([fleet.name], term, request, is_again))
             is_answered = True
             if not found:
-                fleet.rest(1)
+                fleet.rest(1, "queue orders")
                 continue
             task, lease, (order, seconds) = found[0]
             renewed = True
@@ -129,7 +134,7 @@ def pass_door(fleet, resource, door, clock):
             if fences:
                 fence = fences[0]
             else:
-                fleet.rest(max(0.005, min(again, 3)))
+                fleet.rest(max(0.005, min(again, 3)), f"resource {resource}")
         except ConnectionError:
             fleet.rest(0.1)
     begun, stays = clock(), 1.2 if fence % 8 == 0 else 0.02
