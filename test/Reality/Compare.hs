@@ -82,7 +82,8 @@ explored rule limit p
   | otherwise = outcomesBy (randomly 20) {planOptions = options} >>= maybe (pure Nothing) (const everything)
  where
   everything = outcomesBy (randomly 1) {planSearch = Exhaustive maxBound limit, planOptions = options}
-  options = defaultSimOptions {livelockLimit = 2000}
+  -- (Those that are kept have far fewer steps; of others, each of a thousand schedules would take as many.)
+  options = defaultSimOptions {livelockLimit = 200}
   outcomesBy plan = do
     seen <- newIORef Set.empty
     report <- try . explore plan $ \running -> do
