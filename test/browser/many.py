@@ -103,7 +103,7 @@ def killed(browser, hub, robots, stack):
     claim(14, "killed: what it did, and its last interruption", shown["Ann"]["why"], before["why"],
           (shown["Ann"]["runs"], shown["Ann"]["why"]) == (before["runs"], before["why"]))
     with Browser() as late:
-        # (The hub tries again and again, and says why in vain: so the other page is read before and after.)
+        # (The hub tries again and again, and says why it is in vain: so the other page is read before and after.)
         there = [cards(browser)["Ann"]]
         late.open(hub)
         until(lambda: len(cards(late)) == 5, 5, "five cards")
