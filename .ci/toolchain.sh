@@ -146,6 +146,21 @@ need() {
   done
 }
 
+# --- alone ------------------------------------------------------------------
+
+# apart COMMAND...: runs what measures milliseconds. What .ci/run runs beside it (APART: a file) is stopped meanwhile:
+# it would not take the processors, but it may hold what the system locks.
+apart() {
+  local status=0
+  if [ -n "${APART:-}" ]; then
+    touch "$APART"
+    until [ -e "$APART.stopped" ]; do sleep 0.1; done
+  fi
+  "$@" || status=$?
+  [ -z "${APART:-}" ] || rm -f "$APART"
+  return $status
+}
+
 # --- building ---------------------------------------------------------------
 
 # Without an index cabal fails before it has looked for installed packages; the index
