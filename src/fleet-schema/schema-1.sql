@@ -12,7 +12,8 @@
 -- and its lease.
 --
 -- NOTIFY fleet wakes clients, and nothing depends on it: 'queue NAME' (a task waits), 'later NAME' (the clock will make
--- one wait), 'task NUMBER' (of those that were looked at), 'cancel NUMBER', 'resource NAME' (it is free).
+-- one wait), 'task NUMBER' (of those that were looked at), 'cancel NUMBER', 'turn REQUEST' (it may have its resources),
+-- 'line NAME' (another may have that resource), 'resource NAME' (who waits for it may have it).
 
 create schema fleet;
 
@@ -637,9 +638,10 @@ create table fleet.place (
 create index place_resources on fleet.place using gin (resources);
 
 -- All of these resources, or none of them. A request that is repeated (its answer may have been lost) has the same
--- place, and then the same fences. Without fences: when to ask again, in seconds, unless there is a notice of one of
--- the resources before. First come is first served; but who does not ask for 0.5 s, while all that it waits for is
--- free, is passed over.
+-- place, and then the same fences. Without fences: when to ask again, in seconds, unless there is a notice before (see
+-- release): turn with this request, or resource. After line, which is of another's turn, 0.25 s later, unless that
+-- comes again; and in any case after 5 s. First come is first served; but who does not ask for 0.5 s, while all that it
+-- waits for is free, is passed over.
 create function fleet.hold(
   a_request uuid, some_resources text[], a_robot text, a_term interval,
   out resources text[], out fences bigint[], out again_in double precision
@@ -745,7 +747,9 @@ begin
     select distinct request from renewed;
 end $$;
 
--- The request holds nothing, and waits for nothing.
+-- The request holds nothing, and waits for nothing. Of each resource that is free then a notice says whose turn it is:
+-- turn REQUEST and line NAME, of the first that can have all that it waits for; or resource NAME, if there is none (one
+-- may have come just now).
 create function fleet.release(a_request uuid) returns void language plpgsql set lock_timeout = '250ms' as $$
 declare
   at timestamptz;
@@ -757,7 +761,17 @@ begin
   with freed as (
     update fleet.resource set until = at, request = null where request = a_request and until > at returning resource)
   select names || array_agg(resource) into names from freed;
-  perform fleet.tell('resource', name) from unnest(names) name;
+  perform fleet.tell(kind, about) from (select distinct unnest(names)) freed (name)
+    left join lateral (
+      select request from fleet.place
+      where array[name] <@ resources and until > at
+        and not exists (select from fleet.resource r where r.resource = any (resources) and r.until > at)
+      order by place limit 1) next on true
+    cross join lateral (
+      select 'resource', name where request is null
+      union all select * from (values ('turn', request::text), ('line', name)) them where request is not null
+    ) notice (kind, about)
+    where not exists (select from fleet.resource where resource = name and until > at);
 end $$;
 
 -- --- Processes ----------------------------------------------------------------------------------------------------

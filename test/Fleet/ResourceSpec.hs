@@ -155,16 +155,51 @@ spec = describe "A resource" $ do
         isDead <- newTVarIO False
         let inFleet = withFleet (cutOff isDead (fakeDatabase fake)) (Robot "dan" [])
             waits = inFleet (\dan -> holding dan door 2 (\_ -> pure ()))
-            passes (n, robot) = sleepUntil 8 >> holding robot door 2 (\_ -> noting n (pure ()))
+            passesLater (n, robot) = sleepUntil 8 >> holding robot door 2 (\_ -> noting n (pure ()))
         void . allOf $
           [ holding one door 2 (\_ -> sleep 8)
           , firstOf [waits, sleepUntil 7.5 >> atomically (writeTVar isDead True)]
-          , passes (1, one) >> passes (2, other) >> passes (3, third)
+          , passesLater (1, one) >> passesLater (2, other) >> passesLater (3, third)
           ]
       _ -> pure ()
     -- (The first one waits for half a second for the one that has died, the others do not.)
     found `shouldSatisfy` \case
       [(1, begun, _), _, (3, _, over)] -> begun < 9 && over < begun + 0.1
+      _ -> False
+
+  it "is asked for again by the robot whose turn it is, not by all that wait" $ do
+    asked <- newIORef (0 :: Int)
+    let counted session = session {ask = counting (ask session)}
+        counting :: (Request r -> Behavior (Either Refusal r)) -> Request r -> Behavior (Either Refusal r)
+        counting asking request = case request of
+          Hold _ -> modifyIORef' asked (+ 1) >> asking request
+          _ -> asking request
+    run <- simulate $ do
+      at <- fakeDatabase <$> newFakeDatabase
+      withFleet at {opening = \limit use -> opening at limit (use . counted)} (Robot "amy" []) $ \amy -> do
+        sleep 1 -- (The first poll is over.)
+        void (allOf [withRobot amy (Robot name []) passes | n <- [1 .. 20 :: Int], let name = "robot " ++ show n])
+    _ <- well run
+    -- (Once when it comes, and once when it is its turn; the first robot only once.)
+    readIORef asked `shouldReturn` 39
+
+  it "is had in order by those behind one that has died when it was the first" $ do
+    found <- day $ \fake robots noting -> case robots of
+      [one, other, third] -> do
+        isDead <- newTVarIO False
+        let waits = withFleet (cutOff isDead (fakeDatabase fake)) (Robot "dan" []) $ \dan ->
+              holding dan door 2 (\_ -> pure ())
+            dies = sleepUntil 2.5 >> atomically (writeTVar isDead True)
+        inTurn
+          [ holding one door 2 (\_ -> noting 1 (sleep 3))
+          , firstOf [waits, dies]
+          , holding other door 2 (\_ -> noting 2 (sleep 1))
+          , holding third door 2 (\_ -> noting 3 (sleep 1))
+          ]
+      _ -> pure ()
+    found `shouldSatisfy` \case
+      [(1, _, over), (2, begun, over'), (3, begun', _)] ->
+        begun >= over + 0.5 && begun < over + 0.76 && begun' >= over' && begun' < over' + 0.1
       _ -> False
 
   it "whose waiting robot is stopped is not kept from the next one" $ do
@@ -209,6 +244,9 @@ spec = describe "A resource" $ do
     refused door 0.01 "door: a term has 0.1 seconds to 1 day"
     refused door (1 / 0) "door: a duration is a finite number of seconds, not Infinity"
     refused (resource "a\0b") 1 "a\0b: a text has no character U+0000: \"a\\NULb\""
+
+passes :: Fleet -> Behavior ()
+passes robot = holding robot door 2 (\_ -> sleep 0.1)
 
 door, charger :: Resource
 door = resource "door"

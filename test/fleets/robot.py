@@ -65,23 +65,25 @@ class Fleet:
         if connection is not None:
             connection.close()
 
-    def rest(self, seconds, notice=None):
-        """Until there is that notice, and at most that long."""
-        ends = time.monotonic() + seconds
+    def rest(self, seconds, *notices, line=None):
+        """Until there is one of these notices, and at most that long. (After that of the line 0.25 s more, and at most
+        3 s.)"""
+        begun = time.monotonic()
+        ends = begun + seconds
         if self.connection is None:
             time.sleep(min(0.1, seconds))
-        while self.connection is not None and not self.has_come(notice) and time.monotonic() < ends:
+        while self.connection is not None and time.monotonic() < ends:
+            came = {it.payload for it in self.connection.notifies}
+            self.connection.notifies.clear()
+            if came.intersection(notices):
+                break
+            if line in came:
+                ends = min(begun + 3, time.monotonic() + 0.25)
             select.select([self.connection], [], [], max(0, ends - time.monotonic()))
             try:
                 self.connection.poll()
             except psycopg2.Error:
                 self.leave()
-
-    def has_come(self, notice):
-        """Whether there was that notice since it was asked last."""
-        has = notice in [it.payload for it in self.connection.notifies]
-        self.connection.notifies.clear()
-        return has
 
 
 def carry_orders(fleet, term):
@@ -134,7 +136,8 @@ def pass_door(fleet, resource, door, clock):
             if fences:
                 fence = fences[0]
             else:
-                fleet.rest(max(0.005, min(again, 3)), f"resource {resource}")
+                fleet.rest(max(0.005, min(again, 3)), f"turn {request}", f"resource {resource}",
+                           line=f"line {resource}")
         except ConnectionError:
             fleet.rest(0.1)
     begun, stays = clock(), 1.2 if fence % 8 == 0 else 0.02

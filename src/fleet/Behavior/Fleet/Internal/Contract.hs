@@ -200,7 +200,12 @@ data Notice
     OfLater
   | OfTask TaskNumber
   | OfCancel TaskNumber
-  | OfResource Text
+  | -- | A resource is free, and it is not known whose turn it is.
+    OfResource Text
+  | -- | The turn of a request that waits for resources.
+    OfTurn UUID
+  | -- | It is some request's turn to have this resource.
+    OfLine Text
   | -- | Notices may have been missed.
     OfAnything
   deriving (Eq, Ord, Show)

@@ -32,6 +32,7 @@ module Behavior.Fleet.Internal.Fleet
     -- * Notices
   , noticed
   , withNotices
+  , orAfter
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -227,10 +228,9 @@ noticed fleet notice = case notice of
  where
   wake group = writeTVar (mayHave group) True
 
--- | Gives the behaviour what waits for the next notice of one of these (since the last time that it waited), for at
--- most that long.
-withNotices :: Fleet -> [Notice] -> ((Seconds -> Behavior ()) -> Behavior a) -> Behavior a
-withNotices fleet about use = bracket enter (const leave) (use . wait)
+-- | Gives the behaviour what waits for the next notice of one of these, since the last time that it waited.
+withNotices :: Fleet -> [Notice] -> (STM () -> Behavior a) -> Behavior a
+withNotices fleet about use = bracket enter (const leave) (use . change)
  where
   enter = atomically $ do
     modifyTVar' (changes fleet) (\all' -> foldr (Map.alter (Just . maybe (1, 0) (first (+ 1)))) all' about)
@@ -240,9 +240,11 @@ withNotices fleet about use = bracket enter (const leave) (use . wait)
   counts = do
     all' <- readTVar (changes fleet)
     (,) (map (fmap snd . (`Map.lookup` all')) about) <$> readTVar (missed fleet)
-  wait latest seconds = timeout seconds (atomically change) ? pure ()
-   where
-    change = do
-      new <- counts
-      readTVar latest >>= check . (/= new)
-      writeTVar latest new
+  change latest = do
+    new <- counts
+    readTVar latest >>= check . (/= new)
+    writeTVar latest new
+
+-- | Waits for that, and for at most that long.
+orAfter :: STM () -> Seconds -> Behavior ()
+orAfter change seconds = timeout seconds (atomically change) ? pure ()

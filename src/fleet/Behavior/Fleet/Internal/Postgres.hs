@@ -19,6 +19,7 @@ import Control.Monad (unless, void, when, (>=>))
 import Data.ByteString (ByteString)
 import qualified Data.ByteString.Char8 as Bytes
 import qualified Data.Text as Text
+import qualified Data.UUID.Types as UUID
 import qualified Data.UUID.V4 as UUID
 import qualified Database.PostgreSQL.LibPQ as PQ
 import Database.PostgreSQL.Simple hiding (commit)
@@ -157,6 +158,8 @@ noticeOf said = case Bytes.break (== ' ') said of
   ("queue", name) -> OfQueue (text (Bytes.drop 1 name))
   ("later", _) -> OfLater
   ("resource", name) -> OfResource (text (Bytes.drop 1 name))
+  ("line", name) -> OfLine (text (Bytes.drop 1 name))
+  ("turn", number) | Just n <- UUID.fromASCIIBytes (Bytes.drop 1 number) -> OfTurn n
   ("task", number) | Just n <- readMaybe (Bytes.unpack number) -> OfTask (TaskNumber n)
   ("cancel", number) | Just n <- readMaybe (Bytes.unpack number) -> OfCancel (TaskNumber n)
   _ -> OfAnything

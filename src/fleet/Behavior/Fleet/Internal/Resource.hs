@@ -17,6 +17,7 @@ module Behavior.Fleet.Internal.Resource
   ) where
 
 import Control.Exception (finally, throwIO)
+import Control.Monad (when)
 import Data.Int (Int64)
 import Data.List (intercalate)
 import qualified Data.Set as Set
@@ -29,7 +30,7 @@ import Behavior.Fleet.Internal.Database
 import Behavior.Fleet.Internal.Error
 import Behavior.Fleet.Internal.Fleet
 import Behavior.Fleet.Internal.Lease
-import Behavior.STM (atomically)
+import Behavior.STM (atomically, orElse)
 import Behavior.Signal (insteadWhen, named, watching)
 import Behavior.Time (timeout)
 import qualified Behavior.Trace as Trace
@@ -145,7 +146,7 @@ holdingFor patience fleet which seconds use = do
   clock = ownClock (database fleet)
   inTime wait = maybe wait (\limit -> timeout limit wait ? throwIO (StillHeld called limit)) patience
   release number = posted fleet listening (Release number)
-  waitFor wish = Trace.named ("wait for " ++ called) . withNotices fleet (map OfResource names) $ \wait ->
+  waitFor wish = Trace.named ("wait for " ++ called) . withTurns fleet wish $ \waitForTurn ->
     let go = do
           (asked, answer) <- requestTimed fleet listening (Hold wish)
           time <- clock
@@ -153,5 +154,18 @@ holdingFor patience fleet which seconds use = do
             -- (The answer came too late. If it is held still, it is then renewed.)
             Holds _ | time >= lostAt asked seconds -> go
             Holds fences -> (asked, fences) <$ atomically (mapM_ (seen fleet . snd) fences)
-            AskAgainIn again -> wait (max 0.005 (min 3 again)) >> go
+            AskAgainIn again -> waitForTurn (max 0.005 again) >> go
      in go
+
+-- | Gives the behaviour what waits until it is this wish's turn, if that is known; otherwise for at most that long, or,
+-- when others have their turns, until none has for 0.25 s (the last one may have died); in any case for at most 3 s.
+withTurns :: Fleet -> Wish -> ((Seconds -> Behavior ()) -> Behavior a) -> Behavior a
+withTurns fleet wish use =
+  withNotices fleet (OfTurn (wishNumber wish) : map OfResource names) $ \turn ->
+    withNotices fleet (map OfLine names) $ \others ->
+      let wait seconds = do
+            isOthers <- timeout seconds (atomically ((False <$ turn) `orElse` (True <$ others))) ? pure False
+            when isOthers (wait 0.25)
+       in use (\seconds -> timeout 3 (wait seconds) ? pure ())
+ where
+  names = Set.toList (wishFor wish)

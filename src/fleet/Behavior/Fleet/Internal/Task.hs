@@ -199,13 +199,13 @@ findTask fleet (Queue name) key = fmap (fmap Ticket) (request fleet working (Fin
 watchingTask :: Fleet -> Ticket o -> (Signal Task -> Behavior a) -> Behavior a
 watchingTask fleet (Ticket number) use = do
   known <- newTVarIO Nothing
-  withNotices fleet [OfTask number] $ \wait ->
+  withNotices fleet [OfTask number] $ \change ->
     firstOf
       [ use (watching (readTVar known >>= maybe retry pure))
       , forever $ do
           found <- request fleet listening (Look [number]) >>= granted
           mapM_ (atomically . writeTVar known . Just . snd) found
-          wait (pollEvery (options fleet))
+          change `orAfter` pollEvery (options fleet)
       ]
 
 -- | Waits until the task is done, and gives its result.
@@ -216,12 +216,12 @@ watchingTask fleet (Ticket number) use = do
 --
 -- @since 0.1.0.0
 waitForTask :: FromJSON o => Fleet -> Ticket o -> Behavior o
-waitForTask fleet (Ticket number) = withNotices fleet [OfTask number] $ \wait ->
+waitForTask fleet (Ticket number) = withNotices fleet [OfTask number] $ \change ->
   let go = request fleet listening (Look [number]) >>= granted >>= \case
         (_, task) : _
           | state task == Done -> either (throwIO . Undecodable "the result of the task") pure (resultOf task)
           | state task `elem` [Dead, Cancelled] -> throwIO (NotDone (Just (state task)) (reasons task))
-          | otherwise -> wait (pollEvery (options fleet)) >> go
+          | otherwise -> change `orAfter` pollEvery (options fleet) >> go
         [] -> throwIO (NotDone Nothing [])
    in go
  where

@@ -121,6 +121,14 @@ release at number = do
       { places = Map.filter (not . isIts . wish) (places m)
       , resources = Map.union ((\h -> h {heldUntil = at, holderRequest = Nothing}) <$> freed) (resources m)
       }
-  mapM_ (tell . OfResource) (concatMap (Set.toList . wishFor) waited ++ Map.keys freed)
+  forM_ (Set.union (foldMap wishFor waited) (Map.keysSet freed)) $ \name -> getting (turn name) >>= mapM_ tell
  where
+  turn name m
+    | freeFrom (Set.singleton name) m > at = []
+    | otherwise = maybe [OfResource name] (\next -> [OfTurn next, OfLine name]) (listToMaybe (canHave name m))
+  canHave name m =
+    [ wishNumber it
+    | Place it _ end <- Map.elems (places m)
+    , Set.member name (wishFor it) && end > at && freeFrom (wishFor it) m <= at
+    ]
   isIts = (== number) . wishNumber
