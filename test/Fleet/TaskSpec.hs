@@ -80,8 +80,8 @@ spec = do
       found <- day $ \fake fleet -> do
         submitting fleet defaultSubmitOptions "a"
         end <- tryAny (serves fleet 5 (\_ -> throwIO (ErrorCall "the arm")))
-        (,) (either show show end) <$> states fake
-      found `shouldBe` ("the arm", [("a", Later)])
+        (,) (either show show end) . map (\(_, _, task) -> (state task, reasons task)) <$> atomically (tasksThere fake)
+      found `shouldBe` ("the arm", [(Later, ["the arm"])])
 
     it "that are stopped with their robot have failed" $ do
       found <- day $ \fake fleet -> do

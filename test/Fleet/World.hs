@@ -16,7 +16,7 @@ module Fleet.World
   ) where
 
 import Control.Concurrent.STM (check, modifyTVar', newTVarIO, readTVar, readTVarIO, writeTVar)
-import Control.Exception (ErrorCall (..), bracket_, displayException, throwIO)
+import Control.Exception (ErrorCall (..), SomeException (..), bracket_, displayException, throwIO)
 import Control.Monad (forM, forever, replicateM_, void, when)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
@@ -176,7 +176,8 @@ inWorld world = do
           FailsAfter d -> sleep (hundredths d) >> failed
           FaultsAfter d -> sleep (hundredths d) >> throwIO (ErrorCall "the arm")
         pure (instead (modifyTVar' rows (key :)) (writing (\_ -> pure ())))
-      expecting what act = tryAny (void act) >>= either (unexpected what . displayException) pure
+      expecting what act = tryAny (void act) >>= either (unexpected what . text) pure
+      text (SomeException e) = displayException e
       unexpected what why = when (why /= what) (atomically (modifyTVar' others (why :)))
       robotDoes fleet i duty = withRobot fleet (Robot ("robot " ++ show (i :: Int)) []) $ \it -> case duty of
         Serves -> forever (expecting "the arm" (servingWith it orders' carry) >> sleep 0.01)

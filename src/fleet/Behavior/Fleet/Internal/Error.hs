@@ -9,9 +9,10 @@ module Behavior.Fleet.Internal.Error
   ( FleetFailure (..)
   , FleetFault (..)
   , ConnectionLost (..)
+  , textOf
   ) where
 
-import Control.Exception (Exception (..))
+import Control.Exception (Exception (..), SomeException (..))
 import Data.Char (toLower)
 
 import Behavior (Seconds, behaviorFailedFromException, behaviorFailedToException)
@@ -77,3 +78,7 @@ data ConnectionLost
 
 instance Exception ConnectionLost where
   displayException = whyLost
+
+-- | The text of an exception. (Since GHC 9.10 that of 'SomeException' says also where it was thrown.)
+textOf :: SomeException -> String
+textOf (SomeException why) = displayException why

@@ -86,9 +86,9 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
       why <- case ended of
         Right why -> pure why
         Left why -> do
-          writeTVar (lastWhy line) (displayException why)
+          writeTVar (lastWhy line) (textOf why)
           writeTVar (place line) (if isFleetFault why then Refusing why else Nowhere)
-          pure (Just (displayException why))
+          pure (Just (textOf why))
       before <- readTVar said
       unless (isNothing why || why == before) (writeTVar said why >> say why)
     lasted <- maybe (const 0) subtract <$> readTVarIO usedFrom <*> now
@@ -126,7 +126,7 @@ withSession line act = mask $ \restore -> do
     Refusing fault -> throwSTM fault
     _ -> retry
   result <- restore (limited (answerWithin (lineOptions line)) (act session)) `catch` \why -> do
-    atomically (writeTVar (place line) (Broken (lossIn why)) >> writeTVar (lastWhy line) (displayException why))
+    atomically (writeTVar (place line) (Broken (lossIn why)) >> writeTVar (lastWhy line) (textOf why))
     throwIO (onlyStop why)
   result <$ atomically (writeTVar (place line) (Free session))
  where

@@ -193,7 +193,7 @@ called start = "the start " ++ show (startCount start) ++ " of the task " ++ sho
 
 -- | The text of what was thrown, without the names of what failed. (PostgreSQL has no character U+0000.)
 reasonOf :: SomeException -> String
-reasonOf why = [if c == '\0' then '\xfffd' else c | c <- maybe (displayException why) inner (fromException why)]
+reasonOf why = [if c == '\0' then '\xfffd' else c | c <- maybe (textOf why) inner (fromException why)]
  where
   inner (BehaviorFailed _ e) = case fromException (toException e) of
     Just (FailedBecause text) -> text
