@@ -34,8 +34,8 @@ import qualified Data.ByteString.Char8 as Char8
 import Data.Maybe (fromMaybe)
 import Data.Text (Text)
 import qualified Data.Text as Text
+import GHC.Clock (getMonotonicTimeNSec)
 import Network.Socket
-import Network.Wai.Handler.Warp (openFreePort)
 import qualified Network.WebSockets as Websockets
 import System.IO.Error (isResourceVanishedError)
 import Test.Hspec (shouldBe, shouldReturn)
@@ -102,9 +102,17 @@ events connection n
 eventsIn :: Text -> Value -> [Event]
 eventsIn name m = map (either (error . show) id . decodeEvent . encode) (field name m :: [Value])
 
--- | A port that is free.
+-- | A port that is free, and none of those from which the system takes one for each connection: one of those may be
+-- another's before there is a server.
 freePort :: IO Int
-freePort = bracket openFreePort (close . snd) (pure . fst)
+freePort = do
+  time <- getMonotonicTimeNSec
+  let port = 10000 + fromIntegral (time `div` 1024 `mod` 20000)
+      free = bracket (socket AF_INET Stream defaultProtocol) close (`bind` onLoopback port)
+  try free >>= either (\e -> evaluate (e :: IOException) >> freePort) (const (pure port))
+
+onLoopback :: Int -> SockAddr
+onLoopback port = SockAddrInet (fromIntegral port) (tupleToHostAddress (127, 0, 0, 1))
 
 -- | Again until there is a server.
 reachable :: Int -> IO a -> IO a
@@ -118,7 +126,7 @@ withConnection port = bracket open close
  where
   open = do
     s <- socket AF_INET Stream defaultProtocol
-    connect s (SockAddrInet (fromIntegral port) (tupleToHostAddress (127, 0, 0, 1))) `onException` close s
+    connect s (onLoopback port) `onException` close s
     pure s
 
 -- | 'Nothing': the connection was closed. (Of one that is closed before all has been read, the system says that it was
