@@ -78,7 +78,7 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
   options = lineOptions line
   go said pause limit = do
     usedFrom <- newTVarIO Nothing
-    ended <- tryAny . opening database limit $ \session -> do
+    ended <- onlyStopped . tryAny . opening database limit $ \session -> do
       limited (max limit (answerWithin options)) (prepare session)
       now >>= atomically . writeTVar usedFrom . Just
       used said session
@@ -125,16 +125,18 @@ withSession line act = mask $ \restore -> do
     Free session -> session <$ writeTVar (place line) InUse
     Refusing fault -> throwSTM fault
     _ -> retry
-  result <- restore (limited (answerWithin (lineOptions line)) (act session)) `catch` \why -> do
+  result <- onlyStopped $ restore (limited (answerWithin (lineOptions line)) (act session)) `catch` \why -> do
     atomically (writeTVar (place line) (Broken (lossIn why)) >> writeTVar (lastWhy line) (textOf why))
-    throwIO (onlyStop why)
+    throwIO (why :: SomeException)
   result <$ atomically (writeTVar (place line) (Free session))
  where
   lossIn why = whyLost <$> fromException why
-  -- (A loss that comes while it is stopped is nothing that its caller has to know.)
-  onlyStop why = case fromException why of
-    Just (StoppedWithFault stop fault) | isLoss fault -> stop
-    _ -> why
+
+-- | A loss that comes while the behaviour is stopped is nothing that its caller has to know.
+onlyStopped :: Behavior a -> Behavior a
+onlyStopped act = act `catch` \why -> case fromException why of
+  Just (StoppedWithFault stop fault) | isLoss fault -> throwIO stop
+  _ -> throwIO (why :: SomeException)
 
 -- | 'withSession', by the thread of 'answering'. So a caller that is interrupted (it gives up waiting for a door, say)
 -- interrupts no statement: the connection, which all robots of the process share, is used on. What has not begun then
