@@ -754,6 +754,8 @@ create function fleet.release(a_request uuid) returns void language plpgsql set 
 declare
   at timestamptz;
   names text[];
+  name text;
+  next_in_line uuid;
 begin
   delete from fleet.place where request = a_request returning resources into names;
   perform from fleet.resource where request = a_request order by resource for update;
@@ -761,17 +763,18 @@ begin
   with freed as (
     update fleet.resource set until = at, request = null where request = a_request and until > at returning resource)
   select names || array_agg(resource) into names from freed;
-  perform fleet.tell(kind, about) from (select distinct unnest(names)) freed (name)
-    left join lateral (
-      select request from fleet.place
-      where array[name] <@ resources and until > at
-        and not exists (select from fleet.resource r where r.resource = any (resources) and r.until > at)
-      order by place limit 1) next on true
-    cross join lateral (
-      select 'resource', name where request is null
-      union all select * from (values ('turn', request::text), ('line', name)) them where request is not null
-    ) notice (kind, about)
-    where not exists (select from fleet.resource where resource = name and until > at);
+  for name in select distinct unnest(names) loop
+    continue when exists (select from fleet.resource where resource = name and until > at);
+    select request into next_in_line from fleet.place p
+      where array[name] <@ p.resources and p.until > at
+        and not exists (select from fleet.resource r where r.resource = any (p.resources) and r.until > at)
+      order by place limit 1;
+    if found then
+      perform fleet.tell('turn', next_in_line::text), fleet.tell('line', name);
+    else
+      perform fleet.tell('resource', name);
+    end if;
+  end loop;
 end $$;
 
 -- --- Processes ----------------------------------------------------------------------------------------------------
