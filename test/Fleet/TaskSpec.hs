@@ -21,11 +21,12 @@ import Behavior.Fleet
 import Behavior.Fleet.Fake
 import Behavior.Fleet.Internal.Contract (Refusal (..), Request (..))
 import Behavior.Fleet.Internal.Database (Database (..), Session (..))
+import Behavior.Fleet.Internal.Error (ConnectionLost (..))
 import Behavior.Parallel (firstOf)
 import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim (explore, randomly, simulate, well)
-import Behavior.Time (now, timeout)
+import Behavior.Time (now, sleepForever, sleepUntil, timeout)
 
 spec :: Spec
 spec = do
@@ -389,6 +390,20 @@ spec = do
               pure (instead (pure ()) (writing (\_ -> pure ())))
         -- (It is stopped at the same time.)
         serves fleet 0.4 work `both` (sleep 0.4 >> atomically (loseConnections fake))) >>= void . well
+
+  it "Nor is one that is lost, as it is tried, while the fleet ends" . void . explore (randomly 300) $ \simulated ->
+    simulated (do
+      at <- fakeDatabase <$> newFakeDatabase
+      (opened, asked) <- (,) <$> newTVarIO (0 :: Int) <*> newTVarIO 0
+      let first count = atomically ((== 0) <$> readTVar count <* modifyTVar' count (+ 1))
+          -- (The other one is not there: so this one is tried when it has been made.)
+          lostLater session = session {ask = \what -> first asked >>= \is -> if is then ask session what else lost}
+          lost = sleepUntil 1 >> throwIO (ConnectionLost "lost")
+          one = at
+            { opening = \limit use ->
+                first opened >>= \is -> if is then opening at limit (use . lostLater) else sleepForever
+            }
+      withFleet one amy (\_ -> sleepUntil 1)) >>= void . well
 
   it "When one connection is lost, the other is tried at once" $ do
     reports <- newIORef []

@@ -16,7 +16,7 @@ module Fleet.World
   ) where
 
 import Control.Concurrent.STM (check, modifyTVar', newTVarIO, readTVar, readTVarIO, writeTVar)
-import Control.Exception (ErrorCall (..), SomeException (..), bracket_, displayException, throwIO)
+import Control.Exception (ErrorCall (..), bracket_, throwIO)
 import Control.Monad (forM, forever, replicateM_, void, when)
 import qualified Data.Map.Strict as Map
 import Data.Maybe (fromMaybe)
@@ -25,6 +25,7 @@ import Test.QuickCheck (Gen, choose, elements, frequency, listOf, resize, vector
 import Behavior
 import Behavior.Fleet
 import Behavior.Fleet.Fake
+import Behavior.Fleet.Internal.Error (textOf)
 import Behavior.Parallel (allOf, firstOf)
 import Behavior.STM (atomically)
 import Behavior.Time (now, sleepForever, sleepUntil, timeout)
@@ -176,8 +177,7 @@ inWorld world = do
           FailsAfter d -> sleep (hundredths d) >> failed
           FaultsAfter d -> sleep (hundredths d) >> throwIO (ErrorCall "the arm")
         pure (instead (modifyTVar' rows (key :)) (writing (\_ -> pure ())))
-      expecting what act = tryAny (void act) >>= either (unexpected what . text) pure
-      text (SomeException e) = displayException e
+      expecting what act = tryAny (void act) >>= either (unexpected what . textOf) pure
       unexpected what why = when (why /= what) (atomically (modifyTVar' others (why :)))
       robotDoes fleet i duty = withRobot fleet (Robot ("robot " ++ show (i :: Int)) []) $ \it -> case duty of
         Serves -> forever (expecting "the arm" (servingWith it orders' carry) >> sleep 0.01)

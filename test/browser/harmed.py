@@ -69,7 +69,7 @@ def row_8():
             stack.enter_context(socket.create_connection(("127.0.0.1", robot.port)))
         until(lambda: sum(is_there for is_there, _ in connections(robot.port).values()) <= 64, 5, "the end of others")
         # (One that is just being closed may still be there.)
-        more = until(lambda: count() - before <= 65 and count() - before, 5, "the end of others in the robot")
+        more = until(lambda: (n := count() - before) <= 65 and n, 5, "the end of others in the robot")
         claim(8, "files that 200 connections take", more, "60 to 65", 60 <= more <= 65)
         kept = [fd for fd in os.listdir(f"/proc/{robot.process.pid}/fd") if is_kept(robot.process.pid, fd)]
         claim(8, "sockets that a program keeps that the mission starts", kept, "none", not kept)
