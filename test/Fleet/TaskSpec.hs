@@ -394,7 +394,7 @@ spec = do
   it "Nor is one that is lost, as it is tried, while the fleet ends" . void . explore (randomly 300) $ \simulated ->
     simulated (do
       at <- fakeDatabase <$> newFakeDatabase
-      (opened, asked) <- (,) <$> newTVarIO (0 :: Int) <*> newTVarIO 0
+      (opened, asked) <- (,) <$> newTVarIO (0 :: Int) <*> newTVarIO (0 :: Int)
       let first count = atomically ((== 0) <$> readTVar count <* modifyTVar' count (+ 1))
           -- (The other one is not there: so this one is tried when it has been made.)
           lostLater session = session {ask = \what -> first asked >>= \is -> if is then ask session what else lost}
