@@ -152,6 +152,7 @@ throwingSinks = do
           readIORef tried `shouldReturn` 1
           told <- reports
           [show thrown | SinkThrew thrown <- told] `shouldBe` [show e]
+          map show told `shouldBe` ["withTrace: a sink threw an exception, and receives nothing more: " ++ show e]
 
 simulated :: Spec
 simulated = do

@@ -15,7 +15,7 @@ module Behavior.Internal.Sim.Report
   , text
   ) where
 
-import Control.Exception (ErrorCall (..), SomeException (..), displayException, throwIO)
+import Control.Exception (ErrorCall (..), SomeException, throwIO)
 import Data.List (groupBy, intercalate, isInfixOf)
 import Numeric (showFFloat)
 
@@ -23,6 +23,7 @@ import Behavior.Internal.Core.Backend (Label)
 import Behavior.Internal.Core.Failure (isCancellation, isFailure)
 import Behavior.Internal.Core.SafeText
 import Behavior.Internal.Core.Seconds (Seconds (..))
+import Behavior.Internal.Core.Stop (displayed)
 import Behavior.Internal.Sim.Types
 
 -- $setup
@@ -207,4 +208,4 @@ commas = intercalate ", " . map show
 
 -- | The text of an exception, without GHC's own additions.
 text :: SomeException -> String
-text (SomeException e) = safeShow (displayException e)
+text = safeShow . displayed

@@ -37,6 +37,7 @@ import Behavior.Internal.Core.Counter (add, threads)
 import Behavior.Internal.Core.OsSleep (osSleep)
 import Behavior.Internal.Core.SafeText (safeShow, settledText)
 import Behavior.Internal.Core.Seconds (Seconds (..))
+import Behavior.Internal.Core.Stop (displayed)
 import Behavior.Internal.Spans.Event
 import Behavior.Internal.Spans.Place (inPlace, newTrace, placeIn)
 import Behavior.Internal.Tracing.Text (plainLine)
@@ -211,7 +212,7 @@ data SinkProblem
 
 instance Show SinkProblem where
   show = \case
-    SinkThrew e -> "withTrace: a sink threw an exception, and receives nothing more: " ++ safeShow (displayException e)
+    SinkThrew e -> "withTrace: a sink threw an exception, and receives nothing more: " ++ safeShow (displayed e)
     SinkLeft limit n ->
       "withTrace: a sink that was still blocked " ++ show limit
         ++ " s after the end of the trace is left behind; events lost: " ++ show n
