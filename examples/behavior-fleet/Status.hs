@@ -51,8 +51,8 @@ sections =
   , Section "robots" 1 "seen_seconds state host page robot"
       "select robot, case when is_there then 'there' else 'gone' end as state, host, page, process, \
       \round(extract(epoch from fleet.clock() - seen), 1) as seen_seconds \
-      \from (select distinct on (robot) p.*, robot from fleet.processes p, unnest(robots) robot \
-      \order by robot, is_there desc, seen desc) latest order by is_there, robot"
+      \from (select p.*, robot, row_number() over (partition by robot order by is_there desc, seen desc) as n \
+      \from fleet.processes p, unnest(robots) robot) latest where is_there or n = 1 order by is_there, robot, seen desc"
   , Section "starts that run" 3 "expires_seconds start lease robot queue key progress"
       "select queue, key, task, lease, robot, starts as start, progress, \
       \round(extract(epoch from expires_in), 1) as expires_seconds from fleet.starts order by expires_in, task"

@@ -13,6 +13,7 @@ module FleetMission
   , inTable
   ) where
 
+import Control.Exception (onException)
 import Control.Monad (forM, forM_, void)
 import Data.Aeson (FromJSON, ToJSON)
 import Database.PostgreSQL.Simple (execute)
@@ -23,7 +24,7 @@ import Behavior.Fleet
 import Behavior.STM
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Time (retrying, sleepForever)
+import Behavior.Time (cleanupWithin, retrying, sleepForever)
 import Behavior.Trace (named)
 
 data Order = Order
@@ -45,6 +46,8 @@ orders = queue "orders"
 data Body = Body
   { pickUp, carry, putDown :: Order -> Behavior ()
   , passThrough, chargeAt :: Place -> Fence -> Behavior ()
+  , backOut :: Place -> Behavior ()
+  -- ^ In less than 0.9 s.
   , nearestFirst :: [Place] -> Behavior [Place]
   , battery :: Signal Double
   -- ^ From 0 to 100.
@@ -70,15 +73,17 @@ deliver fleet body order = failingOn isLeaseLost $ do
   pure (delivered body order)
  where
   enter = again (through "north door" ? through "south door")
-  through door = soon fleet door (passThrough body door)
+  through door = soon fleet body door (passThrough body door)
   recharge = named "recharge" $ do
     nearest <- nearestFirst body ["charger " ++ show n | n <- [1 .. 4 :: Int]]
-    again (fallbackOver nearest (\charger -> soon fleet charger (chargeAt body charger)))
+    again (fallbackOver nearest (\charger -> soon fleet body charger (chargeAt body charger)))
   again = retrying (repeat 0.1)
 
--- | Uses a door or a charger. Fails if that does not become free within half a second.
-soon :: Fleet -> Place -> (Fence -> Behavior ()) -> Behavior ()
-soon fleet place = holdingWithin 0.5 fleet (resource place) 3
+-- | Uses a door or a charger. Fails if that does not become free within half a second. A robot that is interrupted in it
+-- (its battery is low, its lease is lost) backs out before it is given back, in less than a third of the term.
+soon :: Fleet -> Body -> Place -> (Fence -> Behavior ()) -> Behavior ()
+soon fleet body place use =
+  holdingWithin 0.5 fleet (resource place) 3 $ \fence -> use fence `onException` cleanupWithin 0.9 (backOut body place)
 
 -- | Submits orders, waits until all have ended, and gives those that failed as often as they may. (An office that is
 -- started again submits nothing twice.)

@@ -34,6 +34,7 @@ newBody speed rate say name writes = do
       , carry = \_ -> action "carry" 20
       , putDown = \_ -> action "put down" 1
       , passThrough = \door _ -> action ("pass through " ++ door) 2
+      , backOut = \place -> action ("back out of " ++ place) 0.5
       , chargeAt = \charger _ -> named charger (sleep (lasting 20) >> atomically (writeTVar level 100))
       , nearestFirst = \these -> do
           n <- (`mod` length these) <$> readTVarIO grips

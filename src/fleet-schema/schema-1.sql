@@ -150,7 +150,7 @@ $$;
 -- The number of the task, if it is the same as what is submitted.
 create function fleet.same(t fleet.task, an_input jsonb, a_period interval) returns bigint language plpgsql as $$
 begin
-  if t.input is distinct from an_input or (t.period is null) <> (a_period is null) then
+  if t.input is distinct from an_input or t.period is distinct from a_period then
     perform fleet.refuse('FL002', format('the key %L of the queue %L is that of a task with another input or period',
       coalesce(t.series, t.key), t.queue));
   end if;
@@ -546,6 +546,7 @@ end $$;
 -- What became of a start, for one who does not know whether its completion was committed: running, completed or lost.
 -- (It waits for a transaction that completes it just now.)
 create function fleet.became(a_task bigint, a_lease bigint) returns text language sql as $$
+  select fleet.require_epoch();
   select coalesce((
     select case state when 'running' then 'running' when 'done' then 'completed' else 'lost' end
     from fleet.task where task = a_task and lease = a_lease for share), 'lost')
@@ -553,12 +554,14 @@ $$;
 
 -- The number of a task; null if there is no such task. (Of periodic ones, of that which is to come or runs.)
 create function fleet.number_of(a_queue text, a_key text) returns bigint language sql as $$
+  select fleet.require_epoch();
   select task from fleet.find(a_queue, a_key, a_key)
 $$;
 
 -- The dead tasks of a queue, the oldest first.
 create function fleet.list_dead(a_queue text, a_limit int default 1000)
 returns table (task bigint, key text, starts int, reasons jsonb) language sql as $$
+  select fleet.require_epoch();
   select task, key, starts, reasons from fleet.task where queue = a_queue and state = 'dead' order by task limit a_limit
 $$;
 
@@ -566,6 +569,7 @@ $$;
 create function fleet.look(some_tasks bigint[])
 returns table (task bigint, state fleet.state, starts int, progress jsonb, result jsonb, reasons jsonb)
 language sql as $$
+  select fleet.require_epoch();
   -- (A robot that claims meanwhile skips a row that is locked: so it has to look again.)
   with watched as (
     update fleet.task set is_watched = true where task in (
@@ -581,6 +585,7 @@ create function fleet.cancel(a_queue text, a_key text) returns fleet.state langu
 declare
   t fleet.task;
 begin
+  perform fleet.require_epoch();
   t := fleet.find(a_queue, a_key, a_key);
   select * into t from fleet.task where task = t.task for update;
   if t.series is not null and t.state not in ('later', 'waiting', 'running') then
@@ -601,6 +606,7 @@ end $$;
 -- A dead task has all its starts again: whether there is such a task.
 create function fleet.retry(a_queue text, a_key text) returns boolean language plpgsql as $$
 begin
+  perform fleet.require_epoch();
   -- (Of a periodic task, the next one has been submitted already.)
   update fleet.task set state = 'waiting', starts = 0, ended = null, wakes = null, deadline = null,
     series = null, period = null
@@ -827,8 +833,8 @@ $$;
 
 -- --- A database that was restored ---------------------------------------------------------------------------------
 
--- After the database was restored from a copy: no number is given out that may have been given out before, no start
--- runs, and no resource is free before that term is over, or the longest one that is known. (Of robots that hold one of
+-- After the database was restored from a copy: no number (of a task, neither) is given out that may have been given out
+-- before, no start runs, and no resource is free before that term is over, or the longest one that is known. (Of robots that hold one of
 -- the other database.)
 create function fleet.new_epoch(a_term interval default '1 min') returns bigint language plpgsql as $$
 declare
@@ -844,6 +850,7 @@ begin
   update fleet.about set epoch = new, origin = fleet.origin(), home = 'fleet.about'::regclass::oid, is_restored = false,
     holds_from = fleet.clock() + greatest(a_term, (select max(term) from fleet.resource));
   perform setval('fleet.number', new * 1000000 - 1);
+  perform setval(pg_get_serial_sequence('fleet.task', 'task'), new * 1000000 - 1);
   for t in select * from fleet.task where state = 'running' order by task for update loop
     perform fleet.start_ended(t, 'the database was restored from a copy', false);
   end loop;
@@ -856,6 +863,10 @@ end $$;
 
 create view fleet.queues as
   select queue, state, count(*) as tasks, min(due) as oldest from fleet.task group by queue, state;
+
+create view fleet.to_start as
+  select queue, key, task, state, priority, needs, due, wakes, deadline, starts
+  from fleet.task where state in ('later', 'waiting');
 
 create view fleet.starts as
   select queue, key, task, lease, robot, starts, progress, wakes - fleet.clock() as expires_in
@@ -873,30 +884,7 @@ create view fleet.waits as
 create view fleet.processes as
   select process, host, page, robots, seen, seen + 3 * poll > fleet.clock() as is_there from fleet.process;
 
--- --- Rights -------------------------------------------------------------------------------------------------------
-
--- Functions run with the rights of their owner, so robots need no right to a table. (Their statements are planned once
--- in a session: by itself PostgreSQL plans each again for its first five calls, and those with arrays for all.)
-do $$
-declare
-  f record;
-begin
-  for f in select oid::regprocedure as name, proname from pg_proc where pronamespace = 'fleet'::regnamespace loop
-    execute format('revoke all on function %s from public', f.name);
-    if f.proname = any ('{connect,submit,claim,renew,complete,complete_some,complete_and_claim,fail,give_back,report,
-        became,number_of,list_dead,look,cancel,retry,hold,keep,release,poll,leave,sweep}') then
-      execute format('alter function %s security definer set search_path = fleet, pg_catalog, pg_temp', f.name);
-      execute format('alter function %s set plan_cache_mode = force_generic_plan', f.name);
-      execute format('grant execute on function %s to fleet_robot', f.name);
-    end if;
-  end loop;
-end $$;
-
-grant usage on schema fleet to fleet_robot, fleet_viewer;
-grant execute on function fleet.clock() to fleet_robot, fleet_viewer;
-grant execute on function fleet.origin() to fleet_viewer;
-grant select on fleet.about, fleet.queues, fleet.starts, fleet.dead, fleet.holds, fleet.waits, fleet.processes
-  to fleet_viewer;
+-- --- Its first epoch ----------------------------------------------------------------------------------------------
 
 insert into fleet.about (version, epoch, origin, home)
 values (1, fleet.epoch_at(fleet.clock()), fleet.origin(), 'fleet.about'::regclass::oid);

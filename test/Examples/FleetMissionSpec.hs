@@ -3,7 +3,7 @@
 -- each order is delivered once, no door or charger is shared, and no battery is flat (which is a fault).
 module Examples.FleetMissionSpec (spec) where
 
-import Control.Exception (bracket_)
+import Control.Monad (when)
 import Data.Foldable (for_)
 import Data.List (group, sort)
 import Test.Hspec
@@ -34,6 +34,8 @@ spec = guarded $ do
     Worst.failsWith "(\"delivered twice\",[1" 4 (day calm {killedAt = [5.3], robots = writeThemselves})
   it "and robots that do not hold a door share it" $
     Worst.failsWith "(\"shared\",[\"north door" 4 (day calm {robots = holdNothing})
+  it "and robots that stay in a door when they are interrupted share it" $
+    Worst.failsWith "(\"shared\",[\"north door" 4 (day calm {robots = \_ body -> body {backOut = \_ -> pure ()}})
  where
   writeThemselves world body =
     body {putDown = \order -> atomically (writes world order) >> putDown body order, delivered = \_ -> pure ()}
@@ -71,15 +73,19 @@ data World = World
 writes :: World -> Order -> STM ()
 writes world order = modifyTVar' (rows world) (number order :)
 
-staying :: World -> Place -> Behavior a -> Behavior a
-staying world place = bracket_ (atomically enter) (atomically leave)
+-- | A robot that is interrupted there stays there.
+staying :: World -> Place -> Behavior () -> Behavior ()
+staying world place act = atomically enters >> act >> atomically (leaves world place)
  where
-  enter = do
+  enters = do
     modifyTVar' (visited world) (place :)
     others <- readTVar (present world)
     writeTVar (present world) (place : others)
-    if place `elem` others then modifyTVar' (shared world) (place :) else pure ()
-  leave = modifyTVar' (present world) (\them -> takeWhile (/= place) them ++ drop 1 (dropWhile (/= place) them))
+    when (place `elem` others) $ modifyTVar' (shared world) (place :)
+
+leaves :: World -> Place -> STM ()
+leaves world place =
+  modifyTVar' (present world) (\them -> takeWhile (/= place) them ++ drop 1 (dropWhile (/= place) them))
 
 day :: Day -> Worst.Day
 day today simulated = do
@@ -118,6 +124,7 @@ day today simulated = do
     body
       { passThrough = \door fence -> staying world door (passThrough body door fence)
       , chargeAt = \charger fence -> staying world charger (chargeAt body charger fence)
+      , backOut = \place -> backOut body place >> atomically (leaves world place)
       }
 
 -- | In place of a process that is killed at these times, and started again at once.

@@ -477,6 +477,25 @@ spec = do
     found `shouldBe`
       ("RestoredFromCopy \"this database was restored from a copy: run behavior-fleet new-epoch\"", [("b", Done)])
 
+  it "A ticket of a database that was lost is that of no task of the restored one, whoever asks, and when" $ do
+    found <- day $ \fake fleet -> do
+      copy <- atomically (copyDatabase fake)
+      submitting fleet defaultSubmitOptions "first"
+      serves fleet 1 (\_ -> pure (pure ()))
+      mine <- submit fleet orders "mine" 1
+      atomically (restoreDatabase fake copy)
+      sleep 1
+      let asks = map (fmap (either show (const "")) . tryAny)
+      early <- sequence . asks $
+        [waitForTask fleet mine, void (cancelTask fleet orders "mine"), void (retryTask fleet orders "mine")]
+          ++ [void (findTask fleet orders "mine"), void (deadTasks fleet orders)]
+      runNewEpoch fake
+      mapM_ (submitting fleet defaultSubmitOptions) ["b", "c"]
+      serves fleet 10 (\_ -> pure (pure ()))
+      late <- sequence (asks [waitForTask fleet mine])
+      (,,) (map (takeWhile (/= ' ')) early) late <$> states fake
+    found `shouldBe` (replicate 5 "RestoredFromCopy", ["NotDone Nothing []"], [("b", Done), ("c", Done)])
+
 amy :: Robot
 amy = Robot "amy" ["lift"]
 

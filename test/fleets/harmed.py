@@ -121,8 +121,10 @@ def half_migrated():
     """A database without a schema, with the half of one, and with all but its last statements."""
     with open("src/fleet-schema/schema-1.sql", encoding="utf-8") as file:
         whole = file.read()
+    with open("src/fleet-schema/rights.sql", encoding="utf-8") as file:
+        rights = file.read()
     half = whole[:whole.index("-- --- Resources")]
-    for name, part in [("none", "select"), ("half", half), ("almost", whole[:whole.index("insert into fleet.about")])]:
+    for name, part in [("none", "select"), ("half", half), ("almost", whole[:whole.index("insert into fleet.about")] + rights)]:
         psql(f"drop database if exists {name}", user="postgres", database="postgres")
         psql(f"create database {name}", user="postgres", database="postgres")
         psql(f"grant all on database {name} to owner", user="postgres", database=name)

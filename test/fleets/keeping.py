@@ -348,6 +348,8 @@ def restored(claim, says):
     done = submits(25, database="copy")
     claim("a robot in the copy", f"{done.returncode}: {done.stderr.strip()}", "1: ... run behavior-fleet new-epoch",
           done.returncode == 1 and "RestoredFromCopy" in done.stderr and "run behavior-fleet new-epoch" in done.stderr)
+    says("cancel in the copy", tool("cancel", "orders", "order 1", database="copy"), "run behavior-fleet new-epoch")
+    says("retry in the copy", tool("retry", "orders", "order 1", database="copy"), "run behavior-fleet new-epoch")
     epoch = int(psql("select epoch from fleet.about", database="copy"))
     says("new-epoch by a robot's user", tool("new-epoch", database="copy", user="robot"), "belongs to the role owner")
     is_refused = refused("select fleet.new_epoch()", "robot", "copy")
@@ -355,7 +357,7 @@ def restored(claim, says):
     now = int(psql("select epoch from fleet.about", database="copy"))
     claim("the epoch then", now, epoch, now == epoch)
     done = tool("new-epoch", database="copy")
-    says("new-epoch", done, "Robots go on by themselves", status=0)
+    says("new-epoch", done, "Start the robots", status=0)
     new = int(psql("select epoch from fleet.about", database="copy"))
     claim("the new epoch", new, f"more than {epoch}, and printed", new > epoch and f"epoch is {new}." in done.stdout)
     states = psql("select string_agg(concat_ws(' ', state, n), ', ') from (select state, count(*) as n from fleet.task "
@@ -368,8 +370,36 @@ def restored(claim, says):
     lease = int(psql("select lease from fleet.claim('orders', '{amy}', '{}', '1 hour')", "robot", "copy"))
     greatest = int(psql("select max(lease) from fleet.task"))
     claim("a lease in the copy is greater than all of the original", lease > greatest, "True", lease > greatest)
+    first = int(psql("select min(task) from fleet.task where key = 'order 25'", database="copy"))
+    claim("a task that is submitted then has a greater number than all of the original", first, f"{epoch} 000000 or more",
+          first >= epoch * 10**6)
     shown = json.loads(tool("status", "--json", database="copy", user="viewer").stdout)["is_restored"]
     claim("status of the copy then: is restored", shown, "False", shown is False)
+    elsewhere(claim, says, dump.stdout)
+
+
+def elsewhere(claim, says, dump):
+    """On another server there are no roles: the dump says who has which rights, and that is refused there."""
+    where = f"{FOLDER}/locked"
+    fleet.psql("create database moved owner owner", "postgres", "postgres", where)
+    at = fleet.address("moved", "owner", where)
+    done = subprocess.run([f"{fleet.BIN}/psql", "-Xq", at], input=dump, text=True, capture_output=True, check=False)
+    claim("restored on a server without the roles: errors", done.stderr.count("does not exist"), "10 or more",
+          done.stderr.count("does not exist") >= 10)
+
+    def moved(command):
+        return subprocess.run([TOOL, command, at], text=True, capture_output=True, check=False)
+
+    says("create there", moved("create"), "run behavior-fleet migrate")
+    says("migrate there", moved("migrate"), "Its roles and rights are there", status=0)
+    says("new-epoch there", moved("new-epoch"), "Start the robots", status=0)
+    fleet.psql("create role robot login in role fleet_robot; create role viewer login in role fleet_viewer",
+               "postgres", "postgres", where)
+    is_whole = fleet.psql(PARTS, "owner", "moved", where) == whole()
+    claim("its parts and rights are those of the original", is_whole, "True", is_whole)
+    done = subprocess.run([ROBOTS, fleet.address("moved", "robot", where), *SUBMIT, "25", "0"], text=True,
+                          capture_output=True, check=False)
+    claim("a robot there", f"{done.returncode} {done.stderr.strip()[-200:]}", "0", done.returncode == 0)
 
 
 # --- Status ------------------------------------------------------------------------------------------------------

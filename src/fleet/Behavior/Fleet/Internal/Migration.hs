@@ -33,7 +33,7 @@ import Text.Read (readMaybe)
 import Behavior (Behavior, Seconds, behaviorFailedFromException, behaviorFailedToException)
 import Behavior.Fleet.Internal.Connect
 import Behavior.Fleet.Internal.Error (ConnectionLost (..))
-import Behavior.Fleet.Internal.Schema (versions)
+import Behavior.Fleet.Internal.Schema (rights, versions)
 import Behavior.Fleet.Internal.Version
 
 -- | Why it was not done, and what is to be done first. A failure: 'Behavior.?' catches it.
@@ -68,21 +68,16 @@ createSchema address = withDatabase address $ \connection -> alone connection $ 
       refuse $ "there is a fleet in this database already, and its schema has version " ++ show version
         ++ case compare version newest of
           LT -> ": run behavior-fleet migrate"
-          EQ -> ", the newest: nothing is to be done"
+          EQ -> ", the newest: nothing is to be done (if roles or rights are missing, run behavior-fleet migrate)"
           GT -> ", which is newer than version " ++ show newest ++ " of this program: it needs a newer behavior-lang"
   requireRights connection
-  for_ roles $ \role ->
-    -- (The roles are those of all databases of a server: another one may create them at the same time.)
-    run connection $ mconcat
-      [ "do $$ begin if to_regrole('", role, "') is null then create role ", role, " nologin; end if; "
-      , "exception when duplicate_object or unique_violation then null; end $$"
-      ]
   bringTo versions connection 0
 
 -- | Brings the schema of the database at this address to the version of this library, in one transaction: gives the
--- version that it had, and the one that it has. (They are equal if there was nothing to do.)
+-- version that it had, and the one that it has. Its roles and rights are there then, too: a dump that is restored on
+-- another server lacks them.
 --
--- The user needs to be the owner of the schema.
+-- The user needs to be the owner of the schema, and the right to create roles, if these are missing.
 --
 -- [Result] The two versions.
 -- [Failure] 'SchemaFailure': there is no fleet, its schema is newer than this library, the schema @fleet@ is not one of
@@ -103,9 +98,9 @@ migrateFurther further address = withDatabase address $ \connection -> alone con
   known = versions ++ further
 
 -- | To be called after the database at this address was restored from a copy, when none of the robots that used the
--- other one runs: no start of a task runs in it, and no number of a lease or fence is given out again. No resource is
--- free before that term is over (of 0 s to a day), or the longest one that the database knows: robots that were stopped
--- may have held one. Gives the number of the new epoch. Robots go on by themselves.
+-- other one runs: no start of a task runs in it, and no number of a task, lease or fence is given out again. No resource
+-- is free before that term is over (of 0 s to a day), or the longest one that the database knows: robots that were
+-- stopped may have held one. Gives the number of the new epoch. Then robots may be started.
 --
 -- The user needs to be the owner of the schema.
 --
@@ -193,26 +188,40 @@ requireRights connection = do
   server <- one connection "select current_setting('server_version_num')::int"
   when (server < (150000 :: Int)) $
     refuse ("this server is PostgreSQL " ++ show (server `div` 10000) ++ ", and a fleet needs 15, or a newer one")
-  (mayCreate, mayCreateRoles, database, me) <- row connection
-    "select has_database_privilege(current_database(), 'create'), rolcreaterole or rolsuper, \
-    \quote_ident(current_database()), quote_ident(current_user) from pg_roles where rolname = current_user"
+  (mayCreate, database, me) <- row connection
+    "select has_database_privilege(current_database(), 'create'), quote_ident(current_database()), \
+    \quote_ident(current_user)"
   unless mayCreate . refuse $
     "the role " ++ me ++ " may not create a schema in this database: run, as the database's owner or a superuser, \
       \grant create on database " ++ database ++ " to " ++ me
+
+-- | The roles, if they are missing.
+createRoles :: Connection -> IO ()
+createRoles connection = do
+  (mayCreateRoles, me) <- row connection
+    "select rolcreaterole or rolsuper, quote_ident(current_user) from pg_roles where rolname = current_user"
   missing <- query connection "select name from unnest(?::text[]) name where to_regrole(name) is null"
     (Only (PGArray (map Bytes.unpack roles)))
   unless (mayCreateRoles || null missing) . refuse $
     "the role " ++ me ++ " may not create roles: run, as a superuser,"
       ++ concat [" create role " ++ name ++ " nologin;" | Only name <- missing]
+  for_ roles $ \role ->
+    -- (The roles are those of all databases of a server: another one may create them at the same time.)
+    run connection $ mconcat
+      [ "do $$ begin if to_regrole('", role, "') is null then create role ", role, " nologin; end if; "
+      , "exception when duplicate_object or unique_violation then null; end $$"
+      ]
 
 roles :: [ByteString]
 roles = ["fleet_robot", "fleet_viewer"]
 
--- | Brings the schema from that version to the last of these.
+-- | Brings the schema from that version to the last of these, with its roles and rights.
 bringTo :: [ByteString] -> Connection -> Int -> IO ()
-bringTo known connection from =
+bringTo known connection from = do
+  createRoles connection
   for_ (drop from (zip [1 ..] known)) $ \(version, script) ->
     run connection (script <> "\n; update fleet.about set version = " <> Bytes.pack (show (version :: Int)))
+  run connection rights
 
 run :: Connection -> ByteString -> IO ()
 run connection = void . execute_ connection . Query

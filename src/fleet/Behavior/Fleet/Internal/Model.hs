@@ -53,12 +53,12 @@ doing at = \case
   Fail n l why -> running n l >>= \row -> startEnded at n row why True
   GiveBack n l -> running n l >>= \row -> startEnded at n row "given back" False
   Report n l what -> running n l >>= \row -> put n row {task = (task row) {progress = Just what}} >> tellTask n row
-  Became n l -> became n l
-  Look numbers -> look numbers
-  Find name its -> fmap fst <$> find name its its
-  Cancel name its -> cancel at name its
-  Retry name its -> retryDead name its
-  ListDead name -> listDead name
+  Became n l -> requireEpoch >> became n l
+  Look numbers -> requireEpoch >> look numbers
+  Find name its -> requireEpoch >> fmap fst <$> find name its its
+  Cancel name its -> requireEpoch >> cancel at name its
+  Retry name its -> requireEpoch >> retryDead name its
+  ListDead name -> requireEpoch >> listDead name
   Hold it -> requireEpoch >> hold at it
   Keep wishes -> requireEpoch >> keep at wishes
   Release number -> release at number
@@ -79,7 +79,8 @@ doing at = \case
 newEpoch :: Seconds -> Model -> Model
 newEpoch at = execState . runExceptT $ do
   change (\m -> m {epoch = next m, isRestored = False, places = Map.empty})
-  change (\m -> m {nextNumber = fromIntegral (epoch m) * perEpoch})
+  first <- getting (\m -> fromIntegral (epoch m) * perEpoch)
+  change (\m -> m {nextNumber = Number first, nextRow = TaskNumber first})
   started <- getting (filter ((== Running) . state . task . snd) . Map.toList . rows)
   forM_ started $ \(n, row) -> startEnded at n row "the database was restored from a copy" False
   change (\m -> m {holdsFrom = at + maximum (60 : map holderTerm (Map.elems (resources m)))})

@@ -123,7 +123,7 @@ refusalIn e = case sqlState e of
   "42501" ->
     Just . NoFleet $
       "the fleet's database refuses this user (" <> why <> "): run, as the owner, grant fleet_robot to USER; "
-        <> "if that does not help, the schema is not whole, and behavior-fleet migrate says why"
+        <> "if that does not help, run behavior-fleet migrate, which mends roles and rights"
   _ -> refusalInWrites e
  where
   why = text (sqlErrorMsg e)

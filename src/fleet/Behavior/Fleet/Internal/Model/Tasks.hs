@@ -29,7 +29,7 @@ import qualified Data.ByteString as Bytes
 import Data.Foldable (toList)
 import Data.List (sortOn)
 import qualified Data.Map.Strict as Map
-import Data.Maybe (isJust, listToMaybe, mapMaybe)
+import Data.Maybe (listToMaybe, mapMaybe)
 import Data.Ord (Down (..))
 import qualified Data.Set as Set
 import Data.Text (Text)
@@ -61,7 +61,7 @@ submit at it = do
     refuse "there are at most 20 needs, each of 1 to 50 characters, of 1500 bytes together"
   find (toQueue it) (withKey it) full >>= \case
     Just (n, row)
-      | taskInput (submitted row) == taskInput it && isPeriodic row == isJust (withPeriod it) -> pure n
+      | taskInput (submitted row) == taskInput it && withPeriod (submitted row) == withPeriod it -> pure n
       | otherwise ->
           refuse $
             "the key '" <> withKey it <> "' of the queue '" <> toQueue it
