@@ -60,7 +60,7 @@ commands :: Parser (Behavior String)
 commands =
   hsubparser $
     named "create" (created <$> address) "create the schema in a database, and the roles if they are missing"
-      <> named "migrate" (migrated <$> address) "bring the schema to the version of this program, with its roles and rights"
+      <> named "migrate" (migrated <$> address) "bring the schema, its roles and rights to the version of this program"
       <> named "new-epoch" (renewed <$> term <*> address) "let robots use a database that was restored from a copy"
       <> named "status" (status <$> asJson <*> address) "print queues, robots, leases, and the dead tasks"
       <> named "hub" (shown <$> port <*> address) "serve one live page for all robots that have one"
@@ -105,7 +105,8 @@ migrated :: String -> Behavior String
 migrated at = said <$> migrateSchema at
  where
   said (from, to)
-    | from == to = "The schema has version " ++ show to ++ ", the newest: nothing is to be done. Its roles and rights are there.\n"
+    | from == to =
+        "The schema has version " ++ show to ++ ", the newest: nothing is to be done. Its roles and rights are there.\n"
     | otherwise = "The schema had version " ++ show from ++ ", and has version " ++ show to ++ " now.\n"
 
 renewed :: Double -> String -> Behavior String

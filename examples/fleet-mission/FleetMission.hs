@@ -79,11 +79,12 @@ deliver fleet body order = failingOn isLeaseLost $ do
     again (fallbackOver nearest (\charger -> soon fleet body charger (chargeAt body charger)))
   again = retrying (repeat 0.1)
 
--- | Uses a door or a charger. Fails if that does not become free within half a second. A robot that is interrupted in it
--- (its battery is low, its lease is lost) backs out before it is given back, in less than a third of the term.
+-- | Uses a door or a charger. Fails if that does not become free within half a second. A robot that is interrupted in
+-- it (its battery is low, its lease is lost) backs out before it is given back, in less than a third of the term.
 soon :: Fleet -> Body -> Place -> (Fence -> Behavior ()) -> Behavior ()
 soon fleet body place use =
-  holdingWithin 0.5 fleet (resource place) 3 $ \fence -> use fence `onException` cleanupWithin 0.9 (backOut body place)
+  holdingWithin 0.5 fleet (resource place) 3 $ \fence ->
+    use fence `onException` cleanupWithin 0.9 (backOut body place)
 
 -- | Submits orders, waits until all have ended, and gives those that failed as often as they may. (An office that is
 -- started again submits nothing twice.)

@@ -833,9 +833,9 @@ $$;
 
 -- --- A database that was restored ---------------------------------------------------------------------------------
 
--- After the database was restored from a copy: no number (of a task, neither) is given out that may have been given out
--- before, no start runs, and no resource is free before that term is over, or the longest one that is known. (Of robots that hold one of
--- the other database.)
+-- After the database was restored from a copy: no number is given out that may have been given out before, of tasks,
+-- leases and fences; no start runs; and no resource is free before that term is over, or the longest one that is known.
+-- (Of robots that hold one of the other database.)
 create function fleet.new_epoch(a_term interval default '1 min') returns bigint language plpgsql as $$
 declare
   new bigint;

@@ -124,7 +124,8 @@ def half_migrated():
     with open("src/fleet-schema/rights.sql", encoding="utf-8") as file:
         rights = file.read()
     half = whole[:whole.index("-- --- Resources")]
-    for name, part in [("none", "select"), ("half", half), ("almost", whole[:whole.index("insert into fleet.about")] + rights)]:
+    almost = whole[:whole.index("insert into fleet.about")] + rights
+    for name, part in [("none", "select"), ("half", half), ("almost", almost)]:
         psql(f"drop database if exists {name}", user="postgres", database="postgres")
         psql(f"create database {name}", user="postgres", database="postgres")
         psql(f"grant all on database {name} to owner", user="postgres", database=name)

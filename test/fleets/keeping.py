@@ -371,8 +371,8 @@ def restored(claim, says):
     greatest = int(psql("select max(lease) from fleet.task"))
     claim("a lease in the copy is greater than all of the original", lease > greatest, "True", lease > greatest)
     first = int(psql("select min(task) from fleet.task where key = 'order 25'", database="copy"))
-    claim("a task that is submitted then has a greater number than all of the original", first, f"{epoch} 000000 or more",
-          first >= epoch * 10**6)
+    claim("a task that is submitted then has a greater number than all of the original", first,
+          f"{epoch} 000000 or more", first >= epoch * 10**6)
     shown = json.loads(tool("status", "--json", database="copy", user="viewer").stdout)["is_restored"]
     claim("status of the copy then: is restored", shown, "False", shown is False)
     elsewhere(claim, says, dump.stdout)
@@ -520,7 +520,7 @@ def rights(claim):
                     "'select, insert, update, delete, truncate, references, trigger'))", user)
     claim("what a robot's user may read or write", readable("robot") or "nothing", "nothing", readable("robot") == "")
     claim("what a viewer may read or write", readable("viewer"), "about and the views",
-          readable("viewer") == "about dead holds processes queues starts waits")
+          readable("viewer") == "about dead holds processes queues starts to_start waits")
     tables = "task", "resource", "place", "process"
     denied = [refused(f"select * from fleet.{name}", "robot") for name in (*tables, "about", "queues")]
     denied += [refused(f"select * from fleet.{name}", "viewer") for name in tables]

@@ -100,13 +100,16 @@ def carry_orders(fleet, term):
                 fleet.rest(1, "queue orders")
                 continue
             task, lease, (order, seconds) = found[0]
-            renewed = True
+            # (Without a row the lease is lost; and the row says whether the task is cancelled.)
+            renewed = [(False,)]
             ends = time.monotonic() + seconds
-            while renewed and time.monotonic() < ends:
+            while renewed == [(False,)] and time.monotonic() < ends:
                 time.sleep(min(term / 3, max(0, ends - time.monotonic())))
                 if time.monotonic() < ends:
-                    renewed = fleet.ask("select task from fleet.renew(%s, %s)", ([task], [lease]))
-            if renewed:
+                    renewed = fleet.ask("select is_cancelled from fleet.renew(%s, %s)", ([task], [lease]))
+            if renewed == [(True,)]:
+                fleet.ask("select fleet.fail(%s, %s, 'cancelled')", (task, lease))
+            elif renewed:
                 fleet.ask("select fleet.complete(%s, %s, %s)", (task, lease, json.dumps(None)),
                           before=("insert into delivered (n, robot) values (%s, %s)", (order, fleet.name)))
         except ConnectionError:

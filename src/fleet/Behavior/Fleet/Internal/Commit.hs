@@ -40,8 +40,9 @@ instance Applicative Commit where
 -- >   pure (writing (\c -> void (execute c "insert into delivered (place) values (?)" (Only (place order)))))
 --
 -- It may run more than once, and then all but one of them are rolled back: so it does nothing but write to this
--- database. It must neither begin nor end a transaction (@withSavepoint@ is allowed), and not keep the connection. A
--- lease that is lost meanwhile is noticed at the end of the transaction: nothing is written then.
+-- database. It must neither begin nor end a transaction (@withSavepoint@ is allowed; what a @withTransaction@ has
+-- committed is written, and the start has failed nevertheless), and not keep the connection. A lease that is lost
+-- meanwhile is noticed at the end of the transaction: nothing is written then.
 --
 -- [Failure, fault] Nothing is written, and that start of the task has failed.
 -- [Cancellation] Nothing is written, or all is: see 'Behavior.Fleet.serving'.

@@ -98,9 +98,9 @@ migrateFurther further address = withDatabase address $ \connection -> alone con
   known = versions ++ further
 
 -- | To be called after the database at this address was restored from a copy, when none of the robots that used the
--- other one runs: no start of a task runs in it, and no number of a task, lease or fence is given out again. No resource
--- is free before that term is over (of 0 s to a day), or the longest one that the database knows: robots that were
--- stopped may have held one. Gives the number of the new epoch. Then robots may be started.
+-- other one runs: no start of a task runs in it, and no number of a task, lease or fence is given out again. No
+-- resource is free before that term is over (of 0 s to a day), or the longest one that the database knows: robots that
+-- were stopped may have held one. Gives the number of the new epoch. Then robots may be started.
 --
 -- The user needs to be the owner of the schema.
 --

@@ -34,7 +34,8 @@ data FleetOptions = FleetOptions
   , longestPause :: Seconds
   -- ^ The longest such pause; 2 s by default.
   , pageAddress :: Maybe String
-  -- ^ The address of this process's live page, for those who look at the fleet; none by default.
+  -- ^ The address of this process's live page, for those who look at the fleet, and for @behavior-fleet hub@; none by
+  -- default.
   , onReport :: String -> Behavior ()
   -- ^ What is done with a line about the connection, or about a start of a task that has failed; nothing by default.
   }

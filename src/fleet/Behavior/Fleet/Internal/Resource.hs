@@ -89,6 +89,9 @@ isLeaseLost fault = case fault of
 -- was /asked for/, by this machine's own clock, which goes on while it is suspended. (If the answer takes as long as
 -- that, the resource is asked for again.)
 --
+-- It is given back when the behaviour has ended, also when that was interrupted: then the behaviour has to bring the
+-- robot out of the door, in less than a third of the term ('Behavior.Time.cleanupWithin').
+--
 -- So no other robot holds the resource meanwhile, /if/ this process runs, and stopping the behaviour and a step of the
 -- database's clock take together less than a third of the term. Otherwise only the fence protects, and a resource that
 -- checks no fence is unprotected.

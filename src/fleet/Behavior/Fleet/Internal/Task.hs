@@ -123,7 +123,7 @@ newtype Ticket o = Ticket TaskNumber
 -- [Result] When it is in the database. From then on it will be started, and completed at most once.
 -- [Failure] 'NoDatabase', and then it may have been submitted: submit it again, with the same key. 'NotAllowed' if the
 --   key or the name of the queue has more than 200 characters (or none), or if the key has been submitted with another
---   input.
+--   input or period. (Other options than at first change nothing.)
 -- [Fault] 'RestoredFromCopy', 'WrongSchema'; so it is with all that is asked of a fleet's database.
 -- [Cancellation] It may have been submitted.
 --
