@@ -568,7 +568,7 @@ $$;
 -- A task, for those who have its number; from now on there is a notice of each change.
 create function fleet.look(some_tasks bigint[])
 returns table (task bigint, state fleet.state, starts int, progress jsonb, result jsonb, reasons jsonb)
-language sql as $$
+language sql set lock_timeout = '250ms' as $$
   select fleet.require_epoch();
   -- (A robot that claims meanwhile skips a row that is locked: so it has to look again.)
   with watched as (
@@ -706,8 +706,10 @@ begin
       where resources && names and until > at and (mine is null or place < mine) order by place
     loop
       select max(until) into free_at from fleet.resource where resource = any (other.resources);
-      -- (A robot that holds something waits for none that cannot have all now: that one may wait for it, in a circle.)
-      continue when holds_others and free_at > at;
+      -- (A robot that holds something waits for none whose turn it is not: that one may wait for it, in a circle.)
+      continue when holds_others and (free_at > at or exists (
+        select from fleet.place first
+        where first.place < other.place and first.until > at and first.resources && other.resources));
       if at < greatest(free_at, other.asked) + interval '0.5 s' then
         again_in := least(0.25, extract(epoch from greatest(free_at, other.asked) + interval '0.5 s' - at));
         exit looking;

@@ -10,12 +10,14 @@ import Control.Exception (finally, throwIO)
 import Control.Monad (forM_, replicateM_, void)
 import Data.Foldable (for_)
 import Data.IORef
+import qualified Data.Set as Set
+import qualified Data.Text as Text
 import Test.Hspec
 
 import Behavior
 import Behavior.Fleet
 import Behavior.Fleet.Fake
-import Behavior.Fleet.Internal.Contract (Refusal (..), Request (..))
+import Behavior.Fleet.Internal.Contract (Refusal (..), Request (..), Wish (..))
 import Behavior.Fleet.Internal.Database (Database (..), Session (..))
 import Behavior.Fleet.Internal.Error (ConnectionLost (..))
 import Behavior.Parallel (allOf, firstOf)
@@ -67,6 +69,18 @@ spec = describe "A resource" $ do
           ]
       _ -> pure ()
     [n | (n, _, over) <- found, over < 10] `shouldMatchList` [1, 2, 3]
+
+  it "that is free is not kept from a robot by one that is behind another in the line, which waits for that robot" $ do
+    found <- day $ \_ robots noting -> case robots of
+      [one, other, third] -> do
+        let [a, b] = map resource ["a", "b"]
+        void . allOf $
+          [ holding one b 2 (\_ -> sleep 2 >> holding one a 2 (\_ -> noting 1 (pure ())))
+          , sleep 1 >> holdingAll other [a, b] 2 (\_ -> noting 2 (pure ()))
+          , sleep 1.5 >> holding third a 2 (\_ -> noting 3 (pure ()))
+          ]
+      _ -> pure ()
+    [(n, over < 2.5) | (n, _, over) <- found] `shouldBe` [(1, True), (2, True), (3, True)]
 
   it "is held for longer than its term, while the robot runs" $ do
     found <- day $ \_ robots noting ->
@@ -149,6 +163,21 @@ spec = describe "A resource" $ do
             pure (times !! 1)) >>= well
       time `shouldSatisfy` (< 1)
 
+  it "is kept although many others wait, and the answers to them are late" $ do
+    run <- simulate $ do
+      fake <- newFakeDatabase
+      let late session = session {ask = answers (ask session)}
+          answers :: (Request r -> Behavior (Either Refusal r)) -> Request r -> Behavior (Either Refusal r)
+          answers asking = \case
+            Hold wish | map Text.unpack (Set.toList (wishFor wish)) == ["door"] -> sleep 0.25 >> pure (Left Busy)
+            request -> asking request
+          at = fakeDatabase fake
+      withFleet at {opening = \limit use -> opening at limit (use . late)} (Robot "amy" []) $ \amy -> do
+        Signal.waitUntil (databaseUp amy)
+        let others = allOf [withRobot amy (Robot ("robot " ++ show n) []) passes | n <- [1 .. 20 :: Int]]
+        firstOf [holding amy charger 3 (\_ -> sleep 30 >> now), 0 <$ others]
+    well run >>= (`shouldSatisfy` (> 29))
+
   it "is not kept from others for long by robots that have died while they waited" $ do
     found <- day $ \fake robots noting -> case robots of
       [one, other, third] -> do
@@ -222,6 +251,25 @@ spec = describe "A resource" $ do
         ]
       _ -> pure ()
     found `shouldBe` [(1, 0.1, 5.1), (3, 5.1, 25.1)]
+
+  it "that is waited for within a limit fails for its own reasons, too" $ do
+    ends <- newIORef []
+    _ <- day $ \fake robots _ -> case robots of
+      one : _ -> do
+        let ending which seconds = do
+              end <- tryAny (holdingWithin 100 one which seconds (\_ -> pure ()))
+              modifyIORef' ends (either show show end :)
+        ending door 0.01
+        ending (resource "") 1
+        atomically (setReachable fake False)
+        ending door 1
+        atomically (setReachable fake True)
+      _ -> pure ()
+    reverse <$> readIORef ends `shouldReturn`
+      [ "wait for door: NotAllowed \"a term has 0.1 seconds to 1 day\""
+      , "wait for : NotAllowed \"the name of a resource has 1 to 200 characters\""
+      , "wait for door: NoDatabase \"the fake database\" 60.0 \"connection refused\""
+      ]
 
   it "is waited for, and given up, without the loss of a connection" $ do
     found <- day $ \fake robots noting -> case robots of

@@ -477,7 +477,14 @@ spec = do
     found `shouldBe`
       ("RestoredFromCopy \"this database was restored from a copy: run behavior-fleet new-epoch\"", [("b", Done)])
 
-  it "A ticket of a database that was lost is that of no task of the restored one, whoever asks, and when" $ do
+  it "A task that is kept no more is not watched: that fails" $ do
+    found <- day $ \_ fleet -> do
+      ticket <- submitWith defaultSubmitOptions {keepFor = 0} fleet orders "a" 1
+      serves fleet 10 (\_ -> pure (pure ()))
+      either show (const "") <$> tryAny (watchingTask fleet ticket (Signal.waitUntil . fmap ((== Done) . state)))
+    found `shouldBe` "NotDone Nothing []"
+
+  it "A ticket of a database that was lost is that of no task of the restored one" $ do
     found <- day $ \fake fleet -> do
       copy <- atomically (copyDatabase fake)
       submitting fleet defaultSubmitOptions "first"

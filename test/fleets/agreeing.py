@@ -29,6 +29,20 @@ def agreed():
     tried = re.search(r"OK, passed (\d+) tests", said)
     claim(7, "sequences of requests to PostgreSQL and to the fake database, which agree",
           tried[1] if tried else said, wanted, bool(tried) and int(tried[1]) == wanted)
+    # (A robot's session may have another time zone; and this one has a day of 23 hours then.)
+    psql("""
+      set timezone = 'Europe/Berlin';
+      truncate fleet.task;
+      update fleet.about set is_restored = false;
+      update fleet.tested set at = '2026-03-14 12:00 UTC';
+      select fleet.submit('patrols', 'a', '1', a_deadline => timestamptz '2026-03-14 12:00 UTC' + interval '240 hours',
+        a_period => '240 hours');
+      select fleet.complete(task, lease, 'null') from fleet.claim('patrols', '{amy}', '{}', '10 s');
+    """, host=folder)
+    seconds = psql("select extract(epoch from deadline)::int - extract(epoch from due)::int from fleet.task "
+                   "where state = 'later'", host=folder)
+    claim(7, "from when to when the next of a periodic task may start, in which summer time begins", seconds, "864000",
+          seconds == "864000")
     server("-m", "immediate", "stop", data="agreed/data")
 
 

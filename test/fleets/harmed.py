@@ -2,10 +2,11 @@
 
 import json
 import os
+import pathlib
 import time
 
 from claims import claim
-from fleet import FOLDER, SEED, Robot, address, fresh, number, psql, until
+from fleet import FOLDER, SEED, Robot, address, fresh, kill_all, number, psql, until
 
 COUNT = int(os.environ.get("TIMES") or 10_000)
 OPEN = "state in ('later', 'waiting', 'running')"
@@ -13,6 +14,7 @@ OPEN = "state in ('later', 'waiting', 'running')"
 
 def row_8():
     interrupted()
+    cancelled()
     texts()
     half_migrated()
 
@@ -55,6 +57,36 @@ def interrupted():
     left = number("select count(*) from fleet.resource where until > fleet.clock()") + number(
         "select count(*) from fleet.place where until > fleet.clock()")
     claim(8, "interrupted: resources that are held for no robot, and places in a queue", left, 0, left == 0)
+
+
+def cancelled():
+    """Statements of robots and of an office are ended on the server, by a superuser."""
+    fresh()
+    robots = [Robot("robot", f"cancelled-{n}", 3) for n in range(4)]
+    robots += [Robot("office", "cancelled-office", 1, 300, 0.02)]
+    until(lambda: number("select count(*) from delivered") >= 20, 30, "the first orders")
+    for _ in range(10):
+        psql("""
+          do $$
+          declare pids int[] := array(select pid from pg_stat_activity where application_name like 'cancelled-%');
+          begin
+            for n in 1..200 loop
+              perform pg_cancel_backend(pid) from unnest(pids) pid;
+              perform pg_sleep(0.001);
+            end loop;
+          end $$
+        """, user="postgres")
+    # (A server that another row has started again has a second one.)
+    logs = [path.read_text(errors="replace") for path in pathlib.Path(FOLDER).glob("*.log")]
+    times = "".join(logs).count("canceling statement due to user request")
+    claim(8, "cancelled: statements, according to the server's log", times, "20 or more", times >= 20)
+    until(lambda: number("select count(distinct n) from delivered") == 300, 60, "the last order", step=0.1)
+    ended = [robot.name for robot in robots[:-1] if robot.process.poll() is not None]
+    claim(8, "cancelled: robots' processes that have ended by themselves", ended, [], ended == [])
+    claim(8, "cancelled: the office has ended with", robots[-1].process.wait(30), 0, robots[-1].process.poll() == 0)
+    kill_all(robots)
+    twice = number("select count(*) from (select from delivered group by n having count(*) > 1) it")
+    claim(8, "cancelled: orders with two deliveries", twice, 0, twice == 0)
 
 
 GOOD = ["a'b\"c\\d", "'); drop table fleet.task; --", "\\'); select 1; --", "🤖🚪 ünï", "%s ? $1 {} \t\n\r\x01\x7f",

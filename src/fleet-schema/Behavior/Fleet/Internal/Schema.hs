@@ -17,6 +17,6 @@ import Data.FileEmbed (embedFile)
 versions :: [ByteString]
 versions = [$(embedFile "src/fleet-schema/schema-1.sql")]
 
--- | Who may do what: to be run after each of them, by whom the roles are there already.
+-- | The rights of robots, and of those that only look: to be run after each of them, when the roles are there.
 rights :: ByteString
 rights = $(embedFile "src/fleet-schema/rights.sql")

@@ -46,7 +46,8 @@ connected limit address = losing $ do
     -- A transaction whose client is gone or hangs must not hold locks for long.
     void . execute_ connection $
       "set client_connection_check_interval = '100ms'; set idle_in_transaction_session_timeout = '10s'; \
-      \set client_min_messages = warning; set search_path = public, pg_temp"
+      \set client_min_messages = warning; set search_path = public, pg_temp; \
+      \set default_transaction_isolation = 'read committed'"
     -- (What is committed must be there after a crash.)
     _ <- query_ connection
       "select set_config('synchronous_commit', 'on', false) where current_setting('synchronous_commit') = 'off'"
@@ -99,8 +100,9 @@ isLoss :: SqlError -> Bool
 isLoss e = Bytes.null (sqlState e) || sqlExecStatus e == FatalError && isPassing (sqlState e)
  where
   -- Connection exceptions, insufficient resources, an operator's intervention (the database stops, starts, or has
-  -- ended an idle transaction), read-only (it is a standby), and transactions that are to be tried again.
-  isPassing code = any (`Bytes.isPrefixOf` code) ["08", "53", "57P", "25P03", "25006", "40"]
+  -- ended a statement or an idle transaction), read-only (it is a standby), and transactions that are to be tried
+  -- again.
+  isPassing code = any (`Bytes.isPrefixOf` code) ["08", "53", "57014", "57P", "25P03", "25006", "40"]
 
 -- | A text of the server.
 text :: ByteString -> Text

@@ -117,7 +117,7 @@ keepers fleet =
   connection what why =
     report fleet (maybe ("connected for " ++ what ++ " again") (("no connection for " ++ what ++ ": ") ++) why)
   -- (Once: what is to be asked again must not be in the way of the other leases.)
-  granting what = asking (listening fleet) once >>= either (throwIO . refusedAs) pure
+  granting what = askingFirst (listening fleet) once >>= either (throwIO . refusedAs) pure
    where
     once session = ask session what
   connect session = do

@@ -15,6 +15,7 @@ module Behavior.Fleet.Internal.Line
   , keeping
   , withSession
   , asking
+  , askingFirst
   , posting
   , answering
   ) where
@@ -37,7 +38,7 @@ data Line = Line
   { place :: TVar Place
   , lastWhy :: TVar String
   , lineOptions :: FleetOptions
-  , asked :: TQueue (Behavior ())
+  , askedFirst, asked :: TQueue (Behavior ())
   -- ^ What callers have asked for, and its answer goes to them.
   }
 
@@ -53,7 +54,9 @@ data Place
 
 -- | One that has not connected yet.
 newLine :: FleetOptions -> IO Line
-newLine options = Line <$> newTVarIO Nowhere <*> newTVarIO "it has not connected yet" <*> pure options <*> newTQueueIO
+newLine options =
+  Line
+    <$> newTVarIO Nowhere <*> newTVarIO "it has not connected yet" <*> pure options <*> newTQueueIO <*> newTQueueIO
 
 -- | Whether there is a connection.
 isThere :: Line -> STM Bool
@@ -142,11 +145,19 @@ onlyStopped act = act `catch` \why -> case fromException why of
 -- interrupts no statement: the connection, which all robots of the process share, is used on. What has not begun then
 -- is not done.
 asking :: Line -> (Session -> Behavior a) -> Behavior a
-asking line act = do
+asking line = askingIn (asked line) line
+
+-- | 'asking', before all that waits: what renews leases is not to wait for others, who are many, or whose statements
+-- wait for locks.
+askingFirst :: Line -> (Session -> Behavior a) -> Behavior a
+askingFirst line = askingIn (askedFirst line) line
+
+askingIn :: TQueue (Behavior ()) -> Line -> (Session -> Behavior a) -> Behavior a
+askingIn queue line act = do
   isWanted <- newTVarIO True
   answer <- newTVarIO Nothing
   let unlessUnwanted session = readTVarIO isWanted >>= \is -> if is then Just <$> act session else pure Nothing
-  atomically . writeTQueue (asked line) $
+  atomically . writeTQueue queue $
     tryAny (withSession line unlessUnwanted) >>= atomically . writeTVar answer . either (Just . Left) (fmap Right)
   atomically (readTVar answer >>= maybe retry pure) `onException` atomically (writeTVar isWanted False)
     >>= either throwIO pure
@@ -169,7 +180,7 @@ isLoss why = isJust (fromException why :: Maybe ConnectionLost)
 
 -- | Does what was asked for, one after the other.
 answering :: Line -> Behavior a
-answering line = forever (join (atomically (readTQueue (asked line))))
+answering line = forever (join (atomically (readTQueue (askedFirst line) `orElse` readTQueue (asked line))))
 
 -- (A failure of the behaviour is its own, also one of a limit of time.)
 limited :: Seconds -> Behavior a -> Behavior a

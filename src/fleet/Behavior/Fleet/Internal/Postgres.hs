@@ -63,11 +63,11 @@ sessionOver connection = do
       { ask = \request ->
           statement connection refusalIn (called connection request) <* atomically (writeTVar hasAnswered True)
       , commit = \task lease json wanted ->
-          statement connection refusalInWrites . withTransaction connection $ do
+          statement connection (const Nothing) . withTransaction connection $ do
             o <- (written connection wanted <* stillInTransaction connection) `catchAny` \why -> do
               isThere <- (== PQ.ConnectionOk) <$> withConnection connection PQ.status
               throwIO (if isThere && not (maybe False isLoss (fromException why)) then toException (Users why) else why)
-            o <$ (query connection "select fleet.complete(?, ?, ?)" (task, lease, json o) :: IO [Only ()])
+            o <$ refusing (query connection "select fleet.complete(?, ?, ?)" (task, lease, json o) :: IO [Only ()])
       , listen = losing (void (execute_ connection "listen fleet"))
       , -- (A notice may have come together with an answer: then nothing of it is left at the socket.)
         awaitNews = bracket (threadWaitReadSTM (socket :: Fd)) snd $ \(isReadable, _) ->
@@ -103,9 +103,20 @@ written connection = \case
 -- the server is asked to end it, too.
 statement :: Connection -> (SqlError -> Maybe Refusal) -> IO a -> Behavior (Either Refusal a)
 statement connection refusal act =
-  (Right <$> losing act) `catch` refusing `catch` (\(Users why) -> throwIO why) `onException` cancelThere connection
+  (Right <$> losing act)
+    `catches` [Handler refused, Handler (\(Refused why) -> pure (Left why)), Handler (\(Users why) -> throwIO why)]
+    `onException` cancelThere connection
  where
-  refusing e = maybe (throwIO e) (pure . Left) (refusal e)
+  refused e = maybe (throwIO e) (pure . Left) (refusal e)
+
+-- | What the schema refuses in a transaction in which all else is the user's (also what its commit refuses).
+refusing :: IO a -> IO a
+refusing act = act `catch` \e -> maybe (throwIO e) (throwIO . Refused) (refusalInWrites e)
+
+newtype Refused = Refused Refusal
+  deriving (Show)
+
+instance Exception Refused
 
 -- | What the user's own writes have thrown: it says nothing of the connection.
 newtype Users = Users SomeException

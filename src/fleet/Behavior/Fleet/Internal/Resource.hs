@@ -16,7 +16,7 @@ module Behavior.Fleet.Internal.Resource
   , holdingAll
   ) where
 
-import Control.Exception (finally, throwIO)
+import Control.Exception (finally, throwIO, try)
 import Control.Monad (when)
 import Data.Int (Int64)
 import Data.List (intercalate)
@@ -24,7 +24,7 @@ import qualified Data.Set as Set
 import Data.Text (Text)
 import qualified Data.Text as Text
 
-import Behavior (Behavior, Seconds, (?))
+import Behavior (Behavior, BehaviorFailed, Seconds, (?))
 import Behavior.Fleet.Internal.Contract
 import Behavior.Fleet.Internal.Database
 import Behavior.Fleet.Internal.Error
@@ -110,7 +110,7 @@ isLeaseLost fault = case fault of
 holding :: Fleet -> Resource -> Seconds -> (Fence -> Behavior a) -> Behavior a
 holding fleet which seconds use = holdingAll fleet [which] seconds (use . snd . head)
 
--- | 'holding', which fails with 'StillHeld' if the resource is not free within that time, in seconds.
+-- | 'holding', which fails with 'StillHeld' if the resource is not free within that time, of more than 0 seconds.
 --
 -- > holdingWithin 0.5 fleet (resource "north door") 3 pass ? holding fleet (resource "south door") 3 pass
 --
@@ -147,7 +147,11 @@ holdingFor patience fleet which seconds use = do
   names = [name | Resource name <- which]
   called = intercalate ", " (map Text.unpack names)
   clock = ownClock (database fleet)
-  inTime wait = maybe wait (\limit -> timeout limit wait ? throwIO (StillHeld called limit)) patience
+  inTime wait = case patience of
+    Nothing -> wait
+    -- (A failure of its own is not one of the time.)
+    Just limit -> (timeout limit (try wait) ? throwIO (StillHeld called limit)) >>= either rethrown pure
+  rethrown why = throwIO (why :: BehaviorFailed)
   release number = posted fleet listening (Release number)
   waitFor wish = Trace.named ("wait for " ++ called) . withTurns fleet wish $ \waitForTurn ->
     let go = do

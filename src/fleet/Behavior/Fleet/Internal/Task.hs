@@ -30,9 +30,10 @@ module Behavior.Fleet.Internal.Task
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception
-import Control.Monad (forever)
+import Control.Monad (forever, unless)
 import Data.Aeson (FromJSON, Result (..), ToJSON, Value, fromJSON, toJSON)
 import Data.Bifunctor (first)
+import Data.Maybe (isJust)
 import qualified Data.Set as Set
 import Data.Text (Text)
 import qualified Data.Text as Text
@@ -182,7 +183,7 @@ findTask fleet (Queue name) key = fmap (fmap Ticket) (request fleet working (Fin
 -- The signal has a value when the database has answered, and then the latest that is known: a change is there at once,
 -- and after 'Behavior.Fleet.pollEvery' if its notice was lost. A task that is kept no more has its last one.
 --
--- [Failure] The behaviour's. 'NoDatabase'.
+-- [Failure] The behaviour's. 'NoDatabase'. 'NotDone', if the task is kept no more when this begins.
 -- [Cancellation] Requests the stop of the behaviour.
 --
 -- >>> :{
@@ -205,6 +206,8 @@ watchingTask fleet (Ticket number) use = do
       , forever $ do
           found <- request fleet listening (Look [number]) >>= granted
           mapM_ (atomically . writeTVar known . Just . snd) found
+          isKnown <- isJust <$> readTVarIO known
+          unless isKnown $ throwIO (NotDone Nothing [])
           change `orAfter` pollEvery (options fleet)
       ]
 

@@ -71,15 +71,21 @@ hold at it = do
     let holder = Holder n (Just (wishNumber it)) (wishRobot it) (wishTerm it) (at + wishTerm it)
     (name, n) <$ change (\m -> m {resources = Map.insert name holder (resources m)})
 
-  -- Those that came before, and have not gone. (A robot that holds something waits for none that cannot have all now.)
-  othersBefore mine m =
-    [ (n, other)
-    | (n, other) <- Map.toList (places m)
-    , n < mine
-    , placeUntil other > at
-    , not (Set.disjoint names (wishFor (wish other)))
-    , not (any isHeldHere (resources m) && freeFrom (wishFor (wish other)) m > at)
-    ]
+  -- Those that came before, and have not gone. (A robot that holds something waits for none whose turn it is not.)
+  othersBefore mine m
+    | any isHeldHere (resources m) = filter isTurn others
+    | otherwise = others
+   where
+    others = inLine names mine
+    isTurn (n, other) =
+      freeFrom (wishFor (wish other)) m <= at && null (inLine (wishFor (wish other)) n)
+    inLine these end =
+      [ (n, other)
+      | (n, other) <- Map.toList (places m)
+      , n < end
+      , placeUntil other > at
+      , not (Set.disjoint these (wishFor (wish other)))
+      ]
   isHeldHere holder = holderRobot holder == wishRobot it && heldUntil holder > at
 
   -- How long that one is waited for, after all that it waits for is free.
