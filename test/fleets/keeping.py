@@ -427,6 +427,7 @@ def fill():
       select fleet.hold(gen_random_uuid(), array['room ' || n], 'bob', '1 hour') from generate_series(1, 25) n;
       select fleet.hold(gen_random_uuid(), array[{name}, 'door'], 'carl', '1 hour');
       select fleet.poll(gen_random_uuid(), {name}, {name}, array['amy', {name}], '1 hour');
+      select fleet.poll(gen_random_uuid(), 'of two', null, array['amy'], '1 hour');
       select fleet.poll(gen_random_uuid(), 'host', null, array(select 'robot ' || n from generate_series(1, 30) n),
         '1 hour');
       select fleet.poll(gen_random_uuid(), 'host', null, array['dora', 'amy', repeat('a', 200)], '0');
@@ -468,6 +469,10 @@ def looking(claim, says):
     rows = "select robot, host, page, process, {} as state from fleet.process, unnest(robots) robot where {}"
     same("robots", rows.format("'there'", "poll > '0'") + " union all "
          + rows.format("'gone'", "poll = '0' and robot <> 'amy'"), "robot host page process state".split())
+    to_start = "select count(*), md5(string_agg(concat_ws(' ', queue, key, task, state, needs), ';' order by task)) from "
+    is_same = psql(to_start + "fleet.to_start", "viewer") == psql(
+        to_start + "fleet.task where state in ('later', 'waiting')")
+    claim("fleet.to_start has the tasks that wait, or will", is_same, "True", is_same)
     dead = next(it for it in shown["dead_tasks"] if it["queue"] == HOSTILE)
     claim("status --json: a hostile name", dead["key"] == HOSTILE, "as it was given", dead["key"] == HOSTILE)
     ages = [row["expires_seconds"] for row in shown["starts_that_run"] + shown["holds"]]
