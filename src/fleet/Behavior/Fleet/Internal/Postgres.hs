@@ -109,7 +109,7 @@ statement connection refusal act =
  where
   refused e = maybe (throwIO e) (pure . Left) (refusal e)
 
--- | What the schema refuses in a transaction in which all else is the user's (also what its commit refuses).
+-- | What the schema refuses, in a transaction in which all else is the user's: also what its commit throws.
 refusing :: IO a -> IO a
 refusing act = act `catch` \e -> maybe (throwIO e) (throwIO . Refused) (refusalInWrites e)
 
