@@ -96,6 +96,14 @@ spec = describe "A resource" $ do
     map (\(_, begun, over) -> over - begun > 1.9 && over - begun < 2.1) found `shouldBe` [True]
     readIORef ends `shouldReturn` ["LeaseLost \"door\""]
 
+  it "that was renewed, and then is lost, interrupts at two thirds of the term after it was last asked for" $ do
+    found <- day $ \fake robots noting -> do
+      let first' : _ = robots
+          away = atomically (setReachable fake False) >> sleep 100
+      void . tryAny $ holding first' door 3 (\_ -> sleep 8.7 >> noting 1 away)
+    -- (It is renewed at each third of the term.)
+    map (\(_, begun, over) -> over - begun > 0.9 && over - begun < 2.1) found `shouldBe` [True]
+
   for_ [(1.5, "is held still"), (1.9, "may be another's")] $ \(late, what) ->
     it ("is used only within two thirds of the term after it was asked for: it " ++ what) $ do
       found <- day $ \fake robots noting -> do
