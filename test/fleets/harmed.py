@@ -15,6 +15,7 @@ OPEN = "state in ('later', 'waiting', 'running')"
 def row_8():
     interrupted()
     cancelled()
+    deferred()
     texts()
     half_migrated()
 
@@ -87,6 +88,28 @@ def cancelled():
     kill_all(robots)
     twice = number("select count(*) from (select from delivered group by n having count(*) > 1) it")
     claim(8, "cancelled: orders with two deliveries", twice, 0, twice == 0)
+
+
+def deferred():
+    """What the users' own tables refuse only at the commit is the users' fault, whatever code it has."""
+    for code in "FL001", "22012":
+        fresh()
+        psql(f"""
+          create or replace function refuse() returns trigger language plpgsql as $$
+            begin raise exception using errcode = '{code}', message = 'no more shelves'; end $$;
+          create constraint trigger refusing after insert on delivered deferrable initially deferred
+            for each row execute function refuse();
+          select fleet.submit('orders', 'order 1', '[1, 0]', some_pauses => '{{}}');
+        """)
+        with Robot("robot", f"deferred-{code}", 3) as robot:
+            status = robot.process.wait(30)
+            said = " ".join(word for line in robot.lines() for word in line)
+        claim(8, f"deferred: {code} at the commit: the robot's process ends with", f"{status}: {said[-200:]}",
+              "1, and an SqlError with that code", status == 1 and f'SqlError {{sqlState = "{code}"' in said)
+        found = psql("select state || ' ' || (reasons -> 0 ->> 'reason') from fleet.task")
+        claim(8, f"deferred: {code} at the commit: the task, and why", found[:150], "dead ... no more shelves",
+              found.startswith("dead ") and "no more shelves" in found)
+    psql("drop table delivered; drop function refuse()")
 
 
 GOOD = ["a'b\"c\\d", "'); drop table fleet.task; --", "\\'); select 1; --", "🤖🚪 ünï", "%s ? $1 {} \t\n\r\x01\x7f",
