@@ -804,6 +804,8 @@ create function fleet.poll(
 ) language plpgsql as $$
 declare
   at timestamptz := fleet.clock();
+  to_forget boolean;
+  to_remove boolean;
 begin
   perform fleet.require_epoch();
   perform fleet.check_robots(some_robots);
@@ -814,11 +816,23 @@ begin
     values (a_process, coalesce(a_host, host(inet_client_addr()), 'on the machine of the database'), a_page,
       some_robots, at, a_poll)
     on conflict (process) do update set page = excluded.page, robots = excluded.robots, seen = excluded.seen;
-  delete from fleet.process where process in (
-    select process from fleet.process where seen < at - interval '1 day' for update skip locked);
-  delete from fleet.place where place in (
-    select place from fleet.place where until < at - interval '1 min' for update skip locked);
-  select s.next_in into next_in from fleet.sweep() s;
+  -- (One look, for mostly nothing is to be done.)
+  select
+    (select extract(epoch from wakes - at) from fleet.task
+      where wakes is not null and state in ('later', 'waiting', 'running') order by wakes limit 1),
+    exists (select from fleet.task where wakes <= at and state in ('done', 'cancelled')),
+    exists (select from fleet.process where seen < at - interval '1 day')
+      or exists (select from fleet.place where until < at - interval '1 min')
+    into next_in, to_forget, to_remove;
+  if next_in <= 0 or to_forget then
+    select s.next_in into next_in from fleet.sweep() s;
+  end if;
+  if to_remove then
+    delete from fleet.process where process in (
+      select process from fleet.process where seen < at - interval '1 day' for update skip locked);
+    delete from fleet.place where place in (
+      select place from fleet.place where until < at - interval '1 min' for update skip locked);
+  end if;
   waiting := array(
     with recursive queues as (
       (select queue from fleet.task where state = 'waiting' order by queue limit 1)

@@ -12,27 +12,35 @@ from claims import claim
 from fleet import BUILT, FOLDER, Robot, address, fresh, kill_all, number, psql, until
 from processes import cpu, family, postmaster
 
-SECONDS = 20
-
 
 def row_4():
-    """A thousand robots that wait for tasks, in twenty processes."""
+    """A thousand robots that wait for tasks, in twenty processes, each of which polls every 5 s."""
     fresh()
+    for statement in ("vacuum analyze", "checkpoint"):
+        psql(statement, user="postgres")  # (What was written before is no cost of these.)
     robots = [Robot("idle", f"idle-{n}", 50) for n in range(20)]
     seen = "select count(*) from fleet.process where cardinality(robots) >= 50"
     until(lambda: number(seen) == 20, 60, "all processes", step=0.5)
     time.sleep(5)
-    theirs, servers = [robot.process.pid for robot in robots], family(postmaster())
-    before, begun = (cpu(theirs), cpu(servers)), time.monotonic()
-    time.sleep(SECONDS)
-    used = [(now - then) / (time.monotonic() - begun) * 100 for now, then in zip((cpu(theirs), cpu(servers)), before)]
+    groups = family(postmaster()), [robot.process.pid for robot in robots]
+    # (What the server cleans up once a minute, or a machine that stands still, is in one of these.)
+    windows = [shares(5, groups) for _ in range(4)]
     with Robot("submit", "office", 1, 20, 0) as office:
         until(lambda: office.says("submitted"), 30, "the orders' submission")
         until(lambda: number("select count(*) from delivered") == 20, 10, "their delivery")
     kill_all(robots)
-    for whose, share, limit in (("the database takes", used[1], 1), ("all robots take", used[0], 5)):
-        claim(4, f"1,000 idle robots in 20 processes: of a core, {whose}", f"{share:.2f} %", f"under {limit} %",
-              share < limit)
+    for whose, took, limit in zip(("the database takes", "all robots take"), zip(*windows), (1, 5)):
+        share, each = statistics.median(took), ", ".join(f"{share:.2f}" for share in took)
+        claim(4, f"1,000 idle robots in 20 processes: of a core, {whose}", f"{share:.2f} % ({each})",
+              f"under {limit} %", share < limit)
+
+
+def shares(seconds, groups):
+    """Of a core, in percent, what each of these groups of processes takes."""
+    before, begun = [cpu(group) for group in groups], time.monotonic()
+    time.sleep(seconds)
+    took = time.monotonic() - begun
+    return [(cpu(group) - then) / took * 100 for group, then in zip(groups, before)]
 
 
 ROUNDS = int(os.environ.get("ROUNDS") or 3)
