@@ -265,9 +265,12 @@ awaitIdle thread = eventually $ (`elem` idle) <$> threadStatus thread
 awaitOver :: ThreadId -> IO ()
 awaitOver thread = eventually $ (`elem` [ThreadFinished, ThreadDied]) <$> threadStatus thread
 
--- | Repeats the check until it gives 'True', and yields in between.
+-- | Repeats the check until it gives 'True', and yields in between: to other threads, and the processor, for which
+-- another capability may wait.
 eventually :: IO Bool -> IO ()
-eventually holds = holds >>= \isTrue -> unless isTrue (yield >> eventually holds)
+eventually holds = holds >>= \isTrue -> unless isTrue (yield >> yieldProcessor >> eventually holds)
+
+foreign import ccall unsafe "sched_yield" yieldProcessor :: IO ()
 
 -- | Collects garbage, whereupon GHC finds deadlocks; then it pauses: what collects again and again would leave no time
 -- to the threads of other capabilities.

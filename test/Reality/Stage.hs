@@ -63,12 +63,10 @@ throwsTo target name = thread ("thrower of " ++ name) (interrupt (memberId targe
 untilBlocked :: Member a -> IO ()
 untilBlocked target = inSimulation really (const (sleep 1))
  where
-  really = do
-    status <- threadStatus (memberId target)
-    case status of
-      -- Its exception may still be in flight to another capability.
-      ThreadBlocked BlockedOnException -> replicateM_ 2 everyCapability
-      _ -> unless (blocked status) (yield >> really)
+  really = eventually $ threadStatus (memberId target) >>= \case
+    -- Its exception may still be in flight to another capability.
+    ThreadBlocked BlockedOnException -> True <$ replicateM_ 2 everyCapability
+    status -> pure (blocked status)
 
 blocked :: ThreadStatus -> Bool
 blocked = (`elem` [ThreadBlocked BlockedOnSTM, ThreadBlocked BlockedOnException, ThreadFinished, ThreadDied])

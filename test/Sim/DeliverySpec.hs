@@ -8,7 +8,7 @@ import Control.Concurrent
 import Control.Concurrent.STM (newTVarIO, readTVar, writeTVar)
 import qualified Control.Concurrent.STM as STM
 import Control.Exception hiding (Deadlock)
-import Control.Monad (forM_, unless, void)
+import Control.Monad (forM_, void)
 import Data.IORef
 import Data.List (isInfixOf, nub)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
@@ -157,9 +157,7 @@ realOrder names = do
     me <- myThreadId
     forM_ names $ \name -> do
       thrower <- forkOnWithUnmask here (\free -> free (throwTo me (Cancel name)))
-      let untilBlocked =
-            threadStatus thrower >>= \s -> unless (s == ThreadBlocked BlockedOnException) (yield >> untilBlocked)
-      untilBlocked
+      eventually ((== ThreadBlocked BlockedOnException) <$> threadStatus thrower)
     untilNone (unmask (pure ())) (\text -> modifyIORef logged (text :))
     putMVar end ()
   takeMVar end
