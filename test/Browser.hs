@@ -42,7 +42,7 @@ main = do
     _ -> die "browser: work PORT FILE, flood PORT RATE, hostile PORT FILE, secret PORT or open PORT"
  where
   idle = commanded (const Nothing) sleepForever
-  onPage port = served loopback {robot = "Ann", pagePort = read port}
+  onPage port = served loopback {pageRobot = "Ann", pagePort = read port}
   served page file = runBehavior . viewing defaultViewing {livePage = Just page, traceFile = file}
 
 -- | Runs the behaviour until a line comes that is no command, or the input ends. (A command gives what it does.)

@@ -97,7 +97,7 @@ as chosen address name = runBehavior . withFleetOptions chosen address (Robot na
 
 -- | The defaults, which users have.
 options :: FleetOptions
-options = defaultFleetOptions {onReport = \line -> say ["report", line]}
+options = defaultFleetOptions {onFleetReport = \line -> say ["report", line]}
 
 -- | Prints the words, with the time.
 say :: [String] -> IO ()
@@ -119,7 +119,7 @@ carry name work = do
 -- | (Robots are killed often: so a task may be started often.)
 submitOrder :: Fleet -> Int -> Double -> Behavior (Ticket ())
 submitOrder fleet n seconds =
-  submitWith defaultSubmitOptions {pauses = replicate 100 0} fleet orders ("order " ++ show n) (n, seconds)
+  submitWith defaultSubmitOptions {taskPauses = replicate 100 0} fleet orders ("order " ++ show n) (n, seconds)
 
 -- | Submits the next order, and waits until it is done, again and again.
 office :: Fleet -> IORef Int -> Int -> Double -> Behavior ()
@@ -130,7 +130,7 @@ office fleet next end seconds = do
     else do
       ticket <- submitOrder fleet n seconds
       say ["submitted", show n]
-      watchingTask fleet ticket $ \task -> Signal.waitUntil ((== Done) . state <$> task)
+      watchingTask fleet ticket $ \task -> Signal.waitUntil ((== Done) . taskState <$> task)
       say ["done", show n]
       office fleet next end seconds
 

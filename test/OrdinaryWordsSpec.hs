@@ -9,6 +9,8 @@
 -- module openly has to avoid them, or to hide them.
 --
 -- * "Behavior": attempt, both, failed, fallback, monitor, parallel, sleep
+-- * "Behavior.Fleet": holding, instead, queue, resource, serving, submit, writing
+-- * "Behavior.Live.Hub": hub
 -- * "Behavior.Message": dropped, receive, unhandled
 -- * "Behavior.Parallel": await, decide, fork, pinned, scoped
 -- * "Behavior.Ros": call, entry, latched, latest, measured, patience, publication, publishing, service, topic
@@ -30,6 +32,11 @@ import Data.List (nub)
 import qualified Test.Hspec as Hspec
 
 import Behavior
+import Behavior.Fleet
+import Behavior.Fleet.Fake
+import Behavior.Fleet.Schema
+import Behavior.Live
+import Behavior.Live.Hub
 import Behavior.Message
 import Behavior.Parallel
 import Behavior.Ros
@@ -44,6 +51,7 @@ import Behavior.STM
 import qualified Behavior.Signal as Signal
 import Behavior.Sim
 import Behavior.Sim.Mock
+import Behavior.Sim.QuickCheck
 import Behavior.Time
 import Behavior.Trace
 import Behavior.Trace.Describe
@@ -73,7 +81,7 @@ ordinaryWords =
     height, home, index, input, interrupted, interruptions, item, job, joint, key, kind, label, lane, left, level,
     lift, light, limit, line, load, location, lock, longest, look, lost, low, mass, measure, median, message, mission,
     mode, model, motor, move, name, next, node, nothing, number, obstacle, offset, open, order, origin, outcomes,
-    parent, part, path, pause, place, point, points, position, power, priority, progress, queue, quoted, radius,
+    parent, part, path, pause, place, point, points, position, power, priority, progress, quoted, radius,
     range, rate, reactions, ready, reason, reset, result, right, robot, room, roots, route, run, runs, safe, scan,
     schedule, schedules, score, search, seconds, send, size, slip, speed, start, state, status, step, stop, stopping,
     subject, subjects, table, target, task, temperature, text, thread, tick, time, times, tool, total, turn, unit,
@@ -87,7 +95,7 @@ angle, area, argument, arm, arrived, at, axis, back, base, battery, beacon, begi
   index, input, interrupted, interruptions, item, job, joint, key, kind, label, lane, left, level, lift, light, limit,
   line, load, location, lock, longest, look, lost, low, mass, measure, median, message, mission, mode, model, motor,
   move, name, next, node, nothing, number, obstacle, offset, open, order, origin, outcomes, parent, part, path, pause,
-  place, point, points, position, power, priority, progress, queue, quoted, radius, range, rate, reactions, ready,
+  place, point, points, position, power, priority, progress, quoted, radius, range, rate, reactions, ready,
   reason, reset, result, right, robot, room, roots, route, run, runs, safe, scan, schedule, schedules, score, search,
   seconds, send, size, slip, speed, start, state, status, step, stop, stopping, subject, subjects, table, target,
   task, temperature, text, thread, tick, time, times, tool, total, turn, unit, update, value, velocity, version, wait,
@@ -110,7 +118,7 @@ mission = "mission"; mode = "mode"; model = "model"; motor = "motor"; move = "mo
 node = "node"; nothing = "nothing"; number = "number"; obstacle = "obstacle"; offset = "offset"; open = "open"
 order = "order"; origin = "origin"; outcomes = "outcomes"; parent = "parent"; part = "part"; path = "path"
 pause = "pause"; place = "place"; point = "point"; points = "points"; position = "position"; power = "power"
-priority = "priority"; progress = "progress"; queue = "queue"; quoted = "quoted"; radius = "radius"; range = "range"
+priority = "priority"; progress = "progress"; quoted = "quoted"; radius = "radius"; range = "range"
 rate = "rate"; reactions = "reactions"; ready = "ready"; reason = "reason"; reset = "reset"; result = "result"
 right = "right"; robot = "robot"; room = "room"; roots = "roots"; route = "route"; run = "run"; runs = "runs"
 safe = "safe"; scan = "scan"; schedule = "schedule"; schedules = "schedules"; score = "score"; search = "search"

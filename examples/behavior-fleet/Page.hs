@@ -23,7 +23,7 @@ fleetPage :: Int -> String -> Behavior String
 fleetPage port at = do
   robots <- pages at >>= newTVarIO
   firstOf
-    [ hub loopback {robot = "fleet", pagePort = port} (readTVar robots)
+    [ hub loopback {pageRobot = "fleet", pagePort = port} (readTVar robots)
     , every 2 (tryAny (pages at) >>= either (\_ -> pure ()) (atomically . writeTVar robots))
     ]
 

@@ -77,7 +77,7 @@ status asJson at = looking at $ \connection -> do
     "select version, epoch, is_restored or origin <> fleet.origin() as is_restored from fleet.about"
   if asJson then json connection sections else do
     tables <- mapM (table connection 20 40) sections
-    pure . unlines $ concatMap said about ++ concat [ "" : lines' | lines' <- tables]
+    pure . unlines $ concatMap said about ++ concatMap ("" :) tables
  where
   said (version, epoch, isRestored) =
     ("schema: version " ++ show (version :: Int) ++ ", epoch " ++ show (epoch :: Integer))

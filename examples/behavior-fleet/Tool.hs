@@ -117,7 +117,7 @@ renewed term at = said <$> newEpoch (realToFrac term) at
 retried :: Text -> Text -> String -> Behavior String
 retried queue key at = do
   isDead <- asRobot at "select fleet.retry(?, ?)" (queue, key)
-  if isDead then pure "It is waiting.\n" else throwIO (SchemaFailure ("there is no dead task" ++ of' queue key))
+  if isDead then pure "It is waiting.\n" else throwIO (SchemaFailure ("there is no dead task" ++ itsKey queue key))
 
 cancelled :: Text -> Text -> String -> Behavior String
 cancelled queue key at = do
@@ -126,10 +126,12 @@ cancelled queue key at = do
     Just "cancelled" -> pure "It is cancelled.\n"
     Just "running" -> pure "It runs: it is cancelled when its robot has stopped it, or its lease has expired.\n"
     Just ended -> throwIO (SchemaFailure ("it has ended already, and is " ++ Text.unpack ended))
-    Nothing -> throwIO (SchemaFailure ("there is no task" ++ of' queue key))
+    Nothing -> throwIO (SchemaFailure ("there is no task" ++ itsKey queue key))
 
-of' :: Text -> Text -> String
-of' queue key = " with the key " ++ quotedText (Text.unpack key) ++ " in the queue " ++ quotedText (Text.unpack queue)
+itsKey :: Text -> Text -> String
+itsKey queue key = " with the key " ++ quoted key ++ " in the queue " ++ quoted queue
+ where
+  quoted = quotedText . Text.unpack
 
 -- | What a function of the schema gives, for a robot's user or the owner.
 asRobot :: FromField a => String -> Query -> (Text, Text) -> Behavior a

@@ -108,7 +108,7 @@ performAll :: Options -> ExceptT String IO (String, [String])
 performAll options = case options of
   OfFile file mode -> perform file mode
   -- (Robots on this machine have their own pages at the ports from 8420 on.)
-  Hub robots -> attempt (runBehavior (hub loopback {robot = "robots", pagePort = 8410} (pure robots))) >>= throwE
+  Hub robots -> attempt (runBehavior (hub loopback {pageRobot = "robots", pagePort = 8410} (pure robots))) >>= throwE
 
 perform :: FilePath -> Mode -> ExceptT String IO (String, [String])
 perform file mode = case mode of
@@ -126,7 +126,7 @@ perform file mode = case mode of
     (_, otherEvents, otherRemarks) <- load other
     pure (renderDifference (difference (recording events) (recording otherEvents)), remarks ++ otherRemarks)
   Live ->
-    attempt (runBehavior (showFile (sleep 0.1) loopback {robot = takeFileName file} file)) >>= throwE
+    attempt (runBehavior (showFile (sleep 0.1) loopback {pageRobot = takeFileName file} file)) >>= throwE
 
 -- The header and the events of a file, and a remark if its last line is incomplete.
 load :: FilePath -> ExceptT String IO (Header, [Event], [String])

@@ -93,13 +93,13 @@ office fleet wanted = do
   tickets <- forM wanted $ \order ->
     submitWith (chosen order) fleet orders ("order " ++ show (number order)) order
   forM_ tickets $ \ticket -> watchingTask fleet ticket $ \task ->
-    Signal.waitUntil ((`elem` [Done, Dead, Cancelled]) . state <$> task)
+    Signal.waitUntil ((`elem` [Done, Dead, Cancelled]) . taskState <$> task)
   deadTasks fleet orders
  where
   chosen order =
     defaultSubmitOptions
-      { needs = ["lift" | isHeavy order]
-      , pauses = [0.5, 0.5, 1, 1, 2, 2]
+      { taskNeeds = ["lift" | isHeavy order]
+      , taskPauses = [0.5, 0.5, 1, 1, 2, 2]
       }
 
 -- | In the table of delivered.sql.

@@ -12,7 +12,7 @@ import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
 import Behavior.Fleet
-import Behavior.Live (LivePage (pageHost, pagePort, robot), Viewing (..), viewing)
+import Behavior.Live (LivePage (pageHost, pagePort, pageRobot), Viewing (..), viewing)
 import FleetMission
 import SimulatedBody
 import ViewingOptions (viewingOptions)
@@ -58,7 +58,7 @@ inFleet = with <$> address <*> term <*> within
         { taskTerm = lasts
         , noDatabaseAfter = limit
         , pageAddress = addressOf <$> page
-        , onReport = say
+        , onFleetReport = say
         }
       (postgres database)
   address = strOption $ long "database" <> metavar "ADDRESS" <> value "dbname=fleet" <> showDefault <> help "libpq's"
@@ -74,7 +74,7 @@ robotRole = with <$> inFleet <*> name <*> skillsOf <*> speed <*> viewingOptions 
     body <- newBody faster 0.5 say me (inTable me)
     fleetOf page say (Robot me skilled) (`mission` body)
    where
-    page = (\it -> it {robot = me, pagePort = at}) <$> livePage view
+    page = (\it -> it {pageRobot = me, pagePort = at}) <$> livePage view
     say = putStrLn . ((me ++ ": ") ++)
   name = strArgument (metavar "NAME" <> help "no other robot has it")
   skillsOf = many . strOption $ long "skill" <> metavar "SKILL" <> help "what it is capable of: heavy orders need lift"
@@ -89,7 +89,7 @@ officeRole = with <$> inFleet <*> count
     putStrLn (show (n - length dead) ++ " of " ++ show n ++ " orders are delivered")
     mapM_ (putStrLn . uncurry missing) dead
   missing key task =
-    key ++ " is not, after " ++ show (starts task) ++ " starts; the last one: " ++ last ("" : reasons task)
+    key ++ " is not, after " ++ show (taskStarts task) ++ " starts; the last one: " ++ last ("" : taskReasons task)
   count = option auto (long "orders" <> metavar "NUMBER" <> value 500 <> showDefault <> help "how many")
 
 seconds :: String -> Double -> (Double, Double) -> String -> Parser Seconds

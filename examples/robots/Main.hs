@@ -11,7 +11,7 @@ import System.Exit (die)
 import System.IO (BufferMode (..), hSetBuffering, stdout)
 
 import Behavior
-import Behavior.Live (LivePage (robot), Viewing (..), viewEvents, viewing)
+import Behavior.Live (LivePage (pageRobot), Viewing (..), viewEvents, viewing)
 import Behavior.Message (withInbox)
 import Behavior.STM
 import qualified Behavior.Signal as Signal
@@ -64,7 +64,8 @@ commandLine =
       <*> viewingOptions "robot"
   chosen name =
     maybe (Left ("not a robot: " ++ show name ++ "; allowed: " ++ names)) (Right . (,) name) (lookup name demos)
-  onItsPage (name, run) simulated v = Options run simulated v {livePage = (\page -> page {robot = name}) <$> livePage v}
+  onItsPage (name, run) simulated v =
+    Options run simulated v {livePage = (\page -> page {pageRobot = name}) <$> livePage v}
   names = intercalate ", " (map fst demos)
 
 demos :: [(String, (String -> Behavior ()) -> Behavior ())]

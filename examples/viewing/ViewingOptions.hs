@@ -4,7 +4,7 @@ module ViewingOptions
   ( viewingOptions
   ) where
 
-import Behavior.Live (LivePage (robot), Viewing (..), loopback)
+import Behavior.Live (LivePage (pageRobot), Viewing (..), loopback)
 import Options.Applicative
 
 -- | Of the robot with this name.
@@ -14,6 +14,6 @@ viewingOptions name =
     <$> file "trace" "write the events of the run to this file; behavior-trace shows it"
     <*> file "timeline" "draw the run as an SVG file"
     <*> switch (long "tree" <> help "show what runs as a tree, below the lines that are printed")
-    <*> optional (flag' loopback {robot = name} (long "live" <> help "serve a page that shows it in a browser"))
+    <*> optional (flag' loopback {pageRobot = name} (long "live" <> help "serve a page that shows it in a browser"))
  where
   file this what = optional (strOption (long this <> metavar "FILE" <> help what))

@@ -57,7 +57,7 @@ badWeather moment fake = do
   atomically (losingNotices fake True)
   sleepUntil moment >> atomically (setReachable fake False)
   sleep 15 >> atomically (setReachable fake True)
-  sleep 5 >> atomically (answering fake [DoneAndLost, NoAnswer, LostBefore, DoneWithoutAnswer])
+  sleep 5 >> atomically (willAnswer fake [DoneAndLost, NoAnswer, LostBefore, DoneWithoutAnswer])
 
 -- | What is seen from outside.
 data World = World
@@ -114,7 +114,7 @@ day today simulated = do
   readTVarIO (visited world) >>= (`shouldSatisfy` any (`elem` ["charger " ++ show n | n <- [1 .. 4 :: Int]]))
   there `shouldBe` filter (/= 13) (map number wanted)
   dead <- readTVarIO ends
-  [(key, starts task) | (key, task) <- dead] `shouldBe` [("order 13", 7)]
+  [(key, taskStarts task) | (key, task) <- dead] `shouldBe` [("order 13", 7)]
  where
   wanted = [Order n (n `elem` [10, 12]) | n <- [10 .. 14]]
   amy = Robot "amy" ["lift"]

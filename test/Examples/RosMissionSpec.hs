@@ -103,7 +103,7 @@ missionOn day = withFakeRobot [('/' : name, script name) | name <- names] $ \rob
         atomically (seen robot >>= check . (> n) . length . recharged)
         atomically (writeTVar level 1) >> charges (n + 1)
       breaks = sleepUntil (lostAt day) >> loseLink robot >> sleepForever
-      program = withRosWith defaultRosOptions {pingEvery = 10} (fakeRos robot) mission
+      program = withRosOptions defaultRosOptions {pingEvery = 10} (fakeRos robot) mission
   how <- firstOf [alive, falls, charges 0, breaks, tryAny program]
   events <- atomically (seen robot)
   let text = fst (ended how)

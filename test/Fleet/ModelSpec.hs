@@ -36,7 +36,7 @@ spec = describe "A lease that has expired" $ do
 
   it "counts as a start: when no pause is left, the task is dead" $
     begun [] (\task _ -> asks 2 (Poll (Presence nil Nothing [] 5)) >> asks 2 (Look [task]))
-      `shouldSatisfy` \found -> (map (state . snd) <$> found) == Right [Dead]
+      `shouldSatisfy` \found -> (map (taskState . snd) <$> found) == Right [Dead]
 
 asks :: Seconds -> Request r -> State Model (Either Refusal r)
 asks at request = State.state (\model -> let (answer, next, _) = perform at request model in (answer, next))

@@ -39,10 +39,11 @@ complaints world report =
     [ strange report
     , ["it is not over" | not (all (isOver . snd) (tasks report) && length (tasks report) == length (orders world))]
     , [key ++ " has written " ++ show (length these) ++ " times" | these@(key : _ : _) <- group (sort (written report))]
-    , [key ++ " is " ++ show (state task) ++ ", and has written" | (key, task) <- others, key `elem` written report]
+    , [key ++ " is " ++ show (taskState task) ++ ", and has written" | (key, task) <- others, key `elem` written report]
     , [key ++ " is done, and has not written" | (key, task) <- tasks report, isDone task, key `notElem` written report]
-    , [key ++ " was started too often" | (key, task) <- tasks report, starts task > mayStart key]
-    , [key ++ " is dead too early" | (key, task) <- tasks report, state task == Dead, starts task < mayStart key]
+    , [key ++ " was started too often" | (key, task) <- tasks report, taskStarts task > mayStart key]
+    , [key ++ " is dead too early"
+      | (key, task) <- tasks report, taskState task == Dead, taskStarts task < mayStart key]
     , [show stay ++ " is not alone" | stay <- stays report, beside stay > 0]
     , [ show (one, other) ++ ": their fences"
       | one : later <- tails (filter (isJust . stayFence) (stays report))
@@ -52,6 +53,6 @@ complaints world report =
     ]
  where
   others = filter (not . isDone . snd) (tasks report)
-  isDone = (== Done) . state
-  isOver = (`elem` [Done, Dead, Cancelled]) . state
+  isDone = (== Done) . taskState
+  isOver = (`elem` [Done, Dead, Cancelled]) . taskState
   mayStart key = maybe 0 ((+ 1) . length . pausesBetween) (lookup key (zip (map orderKey [0 ..]) (orders world)))

@@ -81,19 +81,19 @@ step =
  where
   always asked shown = (\request -> Asks (const (Asked request shown))) <$> asked
   about asked shown =
-    (\chosen -> Asks (\starts' -> Asked (asked (chosenFrom chosen starts')) shown)) <$> listOf (choose (0, 5))
-  aboutOne asked shown = (\n -> Asks (\starts' -> Asked (asked (one n starts')) shown)) <$> choose (0, 3)
+    (\chosen -> Asks (\starts -> Asked (asked (chosenFrom chosen starts)) shown)) <$> listOf (choose (0, 5))
+  aboutOne asked shown = (\n -> Asks (\starts -> Asked (asked (one n starts)) shown)) <$> choose (0, 3)
   claiming = Claiming <$> name <*> robots <*> someSkills <*> term <*> wishes <*> elements [False, False, False, True]
-  both' it chosen = Asks $ \starts' ->
-    let ends = [(t, n, String "done") | (t, n) <- map key (chosenFrom chosen starts')]
+  both' it chosen = Asks $ \starts ->
+    let ends = [(t, n, String "done") | (t, n) <- map key (chosenFrom chosen starts)]
      in Asked (CompleteAndClaim ends it) (\(done, those) -> show (sort done, map started those))
   key it = (startTask it, startLease it)
   one :: Int -> [Start] -> (TaskNumber, Number)
-  one n starts' = case drop n starts' of
+  one n starts = case drop n starts of
     it : _ -> key it
     [] -> (TaskNumber 1, 7)
   chosenFrom :: [Int] -> [Start] -> [Start]
-  chosenFrom chosen starts' = concatMap (\n -> take 1 (drop n (nubBy ((==) `on` key) starts'))) (nub chosen)
+  chosenFrom chosen starts = concatMap (\n -> take 1 (drop n (nubBy ((==) `on` key) starts))) (nub chosen)
   started it =
     (startTask it, startLease it, startRobot it, Text.takeWhile (/= '@') (startKey it), startInput it, startCount it)
   shownHeld (Holds fences) = show (sort fences)

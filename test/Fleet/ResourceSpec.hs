@@ -109,7 +109,7 @@ spec = describe "A resource" $ do
       found <- day $ \fake robots noting -> do
         sleep 0.01 -- (The first poll is over.)
         let first' : _ = robots
-        atomically (answering fake [After late])
+        atomically (willAnswer fake [After late])
         holding first' door 0.8 (\_ -> noting 1 (sleep 1))
       found `shouldBe` [(1, 0.01 + late, 1.01 + late)]
 
@@ -142,7 +142,7 @@ spec = describe "A resource" $ do
   it "is waited for, kept and released also when a lock is not free in time" $ do
     found <- day $ \fake robots noting -> case robots of
       one : other : _ -> do
-        let busy = atomically (answering fake (replicate 3 LockNotFree))
+        let busy = atomically (willAnswer fake (replicate 3 LockNotFree))
         sleep 1 -- (The first poll is over.)
         busy
         holding one door 3 (\_ -> noting 1 (busy >> sleep 5 >> busy))
@@ -284,7 +284,7 @@ spec = describe "A resource" $ do
       one : other : _ -> holding one door 3 $ \_ -> do
         Signal.waitUntil (databaseUp other)
         -- (Each time it is interrupted in the middle of a statement.)
-        atomically (answering fake (replicate 1000 (After 0.02)))
+        atomically (willAnswer fake (replicate 1000 (After 0.02)))
         firstOf
           [ replicateM_ 5 (timeout 0.01 (holding other door 3 (\_ -> pure ())) ? pure ())
           , Signal.waitUntil (not <$> databaseUp other) >> noting 1 (pure ())

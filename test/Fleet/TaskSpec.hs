@@ -34,11 +34,11 @@ spec = do
     it "start in the order of their priorities, then of their submission" $
       carried (\fleet -> do
         for_ ["a", "b"] (submitting fleet defaultSubmitOptions)
-        submitting fleet defaultSubmitOptions {priority = 1} "c")
+        submitting fleet defaultSubmitOptions {taskPriority = 1} "c")
         `shouldReturn` ["c", "a", "b"]
 
     it "start only on a robot that is capable of all that they need" $ do
-      let needing fleet what = submitting fleet defaultSubmitOptions {needs = what}
+      let needing fleet what = submitting fleet defaultSubmitOptions {taskNeeds = what}
       carried (\fleet -> needing fleet ["arm"] "a" >> needing fleet ["lift"] "b" >> needing fleet ["arm", "lift"] "c")
         `shouldReturn` ["b"]
 
@@ -66,7 +66,7 @@ spec = do
 
     it "come back after growing pauses when they fail, and are dead when no pause is left" $ do
       (times, found, again) <- day $ \fake fleet -> do
-        submitting fleet defaultSubmitOptions {pauses = [1, 10]} "a"
+        submitting fleet defaultSubmitOptions {taskPauses = [1, 10]} "a"
         begun <- newIORef []
         serves fleet 30 $ \_ -> now >>= \time -> modifyIORef' begun (time :) >> failWith "it slips"
         dead <- map (\(_, _, task) -> task) <$> atomically (tasksThere fake)
@@ -81,14 +81,15 @@ spec = do
       found <- day $ \fake fleet -> do
         submitting fleet defaultSubmitOptions "a"
         end <- tryAny (serves fleet 5 (\_ -> throwIO (ErrorCall "the arm")))
-        (,) (either show show end) . map (\(_, _, task) -> (state task, reasons task)) <$> atomically (tasksThere fake)
+        there <- atomically (tasksThere fake)
+        pure (either show show end, [(taskState task, taskReasons task) | (_, _, task) <- there])
       found `shouldBe` ("the arm", [(Later, ["the arm"])])
 
     it "that are stopped with their robot have failed" $ do
       found <- day $ \fake fleet -> do
         submitting fleet defaultSubmitOptions "a"
         serves fleet 1 (\_ -> sleep 100 >> pure (pure ()))
-        map (\(_, _, task) -> (state task, reasons task)) <$> atomically (tasksThere fake)
+        map (\(_, _, task) -> (taskState task, taskReasons task)) <$> atomically (tasksThere fake)
       found `shouldBe` [(Later, ["its robot was stopped"])]
 
     it "with a start that no robot waits for is given back, and that start does not count" $ do
@@ -96,17 +97,17 @@ spec = do
         -- (The answer comes when the robot has been stopped.)
         sleep 1
         submitting fleet defaultSubmitOptions "a"
-        atomically (answering fake [After 1])
+        atomically (willAnswer fake [After 1])
         serves fleet 0.5 (\_ -> pure (pure ()))
         sleep 1
-        map (\(_, _, task) -> (state task, starts task)) <$> atomically (tasksThere fake)
+        map (\(_, _, task) -> (taskState task, taskStarts task)) <$> atomically (tasksThere fake)
       found `shouldBe` [(Waiting, 0)]
 
     it "that are started, and the answer is lost, are started no second time" $ do
       found <- day $ \fake fleet -> do
-        submitting fleet defaultSubmitOptions {pauses = []} "a"
+        submitting fleet defaultSubmitOptions {taskPauses = []} "a"
         begun <- newIORef (0 :: Int)
-        atomically (answering fake [DoneAndLost, DoneAndLost])
+        atomically (willAnswer fake [DoneAndLost, DoneAndLost])
         serves fleet 30 (\work -> pure () <$ modifyIORef' begun (+ workStart work))
         (,) <$> readIORef begun <*> states fake
       found `shouldBe` (1, [("a", Done)])
@@ -118,9 +119,9 @@ spec = do
             serve n = withRobot fleet (Robot ("robot " ++ show (n :: Int)) []) (\robot -> serving robot words' work)
         for_ [1 .. 3] (\n -> submit fleet words' (show n) n)
         -- (The second and the third are ready while the first is being completed.)
-        let slowly = sleep 1.05 >> atomically (answering fake [After 1])
+        let slowly = sleep 1.05 >> atomically (willAnswer fake [After 1])
         void (timeout 3 (firstOf (map serve [1 .. 3]) `both` slowly)) ? pure ()
-        map (\(_, key, task) -> (key, state task, reasons task)) <$> atomically (tasksThere fake)
+        map (\(_, key, task) -> (key, taskState task, taskReasons task)) <$> atomically (tasksThere fake)
       found
         `shouldBe` [ ("1", Done, [])
                    , ("2", Done, [])
@@ -131,7 +132,7 @@ spec = do
       day (\fake fleet -> do
         submitting fleet defaultSubmitOptions "a"
         serves fleet 100 (\_ -> sleep 95 >> pure (pure ()))
-        map (\(_, _, task) -> (state task, starts task)) <$> atomically (tasksThere fake))
+        map (\(_, _, task) -> (taskState task, taskStarts task)) <$> atomically (tasksThere fake))
         `shouldReturn` [(Done, 1)]
 
     it "are stopped at two thirds of the term when the database is away, and started again" $ do
@@ -191,7 +192,7 @@ spec = do
           withFleet (through answers (fakeDatabase fake)) amy $ \fleet -> do
             submitting fleet defaultSubmitOptions "a"
             serves fleet 30 (\_ -> sleep 25 >> pure (pure ())) `both` holds fleet
-            map (\(_, _, task) -> (state task, starts task)) <$> atomically (tasksThere fake)) >>= well
+            map (\(_, _, task) -> (taskState task, taskStarts task)) <$> atomically (tasksThere fake)) >>= well
         found `shouldBe` [(Done, 1)]
 
     it "are cancelled: at once while they wait, and a robot is stopped" $ do
@@ -238,8 +239,8 @@ spec = do
       found <- day $ \_ fleet -> do
         ticket <- submit fleet orders "a" 1
         let work start = reportProgress start (String "half") >> sleep 1 >> pure (pure ())
-            half task = if state task == Running && isJust (progress task) then Just (progress task) else Nothing
-            done task = if state task == Done then Just (result task) else Nothing
+            half task = if taskState task == Running then Just <$> taskProgress task else Nothing
+            done task = if taskState task == Done then Just (taskResult task) else Nothing
         watchingTask fleet ticket $ \task ->
           firstOf
             [ (,) <$> Signal.waitUntilJust (half <$> task) <*> Signal.waitUntilJust (done <$> task)
@@ -261,13 +262,13 @@ spec = do
 
     it "that are dead or cancelled fail for those that wait for them, and are listed" $ do
       found <- day $ \_ fleet -> do
-        for_ ["a", "b"] (submitting fleet defaultSubmitOptions {pauses = []})
+        for_ ["a", "b"] (submitting fleet defaultSubmitOptions {taskPauses = []})
         Just dead <- findTask fleet orders "a"
         Just cancelled <- findTask fleet orders "b"
         _ <- cancelTask fleet orders "b"
         serves fleet 5 (\_ -> failWith "it slips")
         ends <- traverse (tryAny . waitForTask fleet) [dead, cancelled]
-        (,) (map (either show show) ends) . map (fmap reasons) <$> deadTasks fleet orders
+        (,) (map (either show show) ends) . map (fmap taskReasons) <$> deadTasks fleet orders
       found
         `shouldBe` ( ["NotDone (Just Dead) [\"it slips\"]", "NotDone (Just Cancelled) []"]
                    , [("a", ["it slips"])]
@@ -297,7 +298,7 @@ spec = do
                   pure () <$ sleep (if workKey start == "b" then 0.019 else 0.009)
             for_ ["a", "b", "c", "d", "e", "f", "g", "h"] (submitting fleet defaultSubmitOptions)
             for_ ["1", "2"] (\key -> submit fleet others key 1)
-            atomically (answering fake (replicate 100 (After 0.01)))
+            atomically (willAnswer fake (replicate 100 (After 0.01)))
             void (timeout 5 . firstOf $
               [servingWith fleet orders work, servingWith bob orders work, servingWith fleet others work]) ? pure ())
         >>= well
@@ -319,19 +320,19 @@ spec = do
           refused chosen key why =
             day (\_ fleet -> submitting fleet chosen key) `shouldThrow` errorCall ("it failed: " ++ why)
       refused defaultSubmitOptions "a\0" "a text has no character U+0000: \"a\\NUL\""
-      refused defaultSubmitOptions {pauses = [0 / 0]} "a" "a duration is a finite number of seconds, not NaN"
-      refused defaultSubmitOptions {pauses = [-1]} "a" "a pause has 0 seconds to 10 years"
+      refused defaultSubmitOptions {taskPauses = [0 / 0]} "a" "a duration is a finite number of seconds, not NaN"
+      refused defaultSubmitOptions {taskPauses = [-1]} "a" "a pause has 0 seconds to 10 years"
       refused defaultSubmitOptions {everyPeriod = Just 0.5} "a" "a period has 1 second to 10 years"
       refused defaultSubmitOptions {keepFor = -1} "a" "a task is kept for 0 seconds to 100 years"
       refused defaultSubmitOptions "" "a key has 1 to 200 characters"
 
     it "whose input is not what the robot expects have failed, and the robot goes on" $ do
       found <- day $ \fake fleet -> do
-        let chosen = defaultSubmitOptions {pauses = []}
+        let chosen = defaultSubmitOptions {taskPauses = []}
         _ <- submitWith chosen fleet (queue "orders" :: Queue String ()) "a" "seventeen"
         submitting fleet chosen "b"
         serves fleet 5 (\_ -> pure (pure ()))
-        (,) <$> states fake <*> (map (reasons . snd) <$> deadTasks fleet orders)
+        (,) <$> states fake <*> (map (taskReasons . snd) <$> deadTasks fleet orders)
       found
         `shouldBe` ( [("a", Dead), ("b", Done)]
                    , [ [ "its input is not what this robot expects: \
@@ -347,18 +348,18 @@ spec = do
           submitting fleet defaultSubmitOptions "a"
           rows <- newTVarIO (0 :: Int)
           serves fleet 50 $ \_ -> do
-            atomically (answering fake [answer])
+            atomically (willAnswer fake [answer])
             pure (instead (modifyTVar' rows (+ 1)) (writing (\_ -> pure ())))
           (,) <$> readTVarIO rows <*> states fake
         found `shouldBe` (1, [("a", Done)])
 
     it "is not committed, if a lock is not free at four times" $ do
       found <- day $ \fake fleet -> do
-        submitting fleet defaultSubmitOptions {pauses = []} "a"
+        submitting fleet defaultSubmitOptions {taskPauses = []} "a"
         serves fleet 5 $ \_ -> do
-          atomically (answering fake (replicate 4 LockNotFree))
+          atomically (willAnswer fake (replicate 4 LockNotFree))
           pure (instead (pure ()) (writing (\_ -> pure ())))
-        map (reasons . snd) <$> deadTasks fleet orders
+        map (taskReasons . snd) <$> deadTasks fleet orders
       found `shouldBe` [["what the task writes could not be committed: a lock was not free in time"]]
 
     it "is not there, if its lease was lost" $ do
@@ -386,7 +387,7 @@ spec = do
       withFleet (fakeDatabase fake) amy $ \fleet -> do
         submitting fleet defaultSubmitOptions "a"
         let work _ = do
-              atomically (answering fake [NoAnswer, NoAnswer])
+              atomically (willAnswer fake [NoAnswer, NoAnswer])
               pure (instead (pure ()) (writing (\_ -> pure ())))
         -- (It is stopped at the same time.)
         serves fleet 0.4 work `both` (sleep 0.4 >> atomically (loseConnections fake))) >>= void . well
@@ -410,11 +411,11 @@ spec = do
     _ <- simulate (do
       fake <- newFakeDatabase
       let reported line = now >>= \time -> modifyIORef' reports ((time, line) :)
-          chosen = defaultFleetOptions {pollEvery = 1000, onReport = reported}
+          chosen = defaultFleetOptions {pollEvery = 1000, onFleetReport = reported}
       withFleetOptions chosen (fakeDatabase fake) amy $ \fleet -> do
         sleep 1
         -- (It is frozen.)
-        atomically (answering fake [NoAnswer, NoAnswer])
+        atomically (willAnswer fake [NoAnswer, NoAnswer])
         submitting fleet defaultSubmitOptions "a" `both` sleep 10) >>= well
     lost <- filter ((== "no connection for") . take 17 . snd) <$> readIORef reports
     reverse (map fst lost) `shouldSatisfy` \case
@@ -425,13 +426,13 @@ spec = do
     reports <- newIORef []
     found <- simulate (do
       fake <- newFakeDatabase
-      let chosen = defaultFleetOptions {noDatabaseAfter = 3, onReport = \line -> modifyIORef' reports (line :)}
+      let chosen = defaultFleetOptions {noDatabaseAfter = 3, onFleetReport = \line -> modifyIORef' reports (line :)}
       withFleetOptions chosen (fakeDatabase fake) amy $ \fleet -> do
         sleep 1
-        atomically (answering fake (replicate 5 LockNotFree))
+        atomically (willAnswer fake (replicate 5 LockNotFree))
         submitting fleet defaultSubmitOptions "a"
         time <- now
-        atomically (answering fake (replicate 100 LockNotFree))
+        atomically (willAnswer fake (replicate 100 LockNotFree))
         (,) time <$> try (submitting fleet defaultSubmitOptions "b")) >>= well
     fst found `shouldSatisfy` \time -> time > 1.49 && time < 1.51
     snd found `shouldBe` Left (NoDatabase "the fake database" 3 "a lock was not free in time")
@@ -481,7 +482,7 @@ spec = do
     found <- day $ \_ fleet -> do
       ticket <- submitWith defaultSubmitOptions {keepFor = 0} fleet orders "a" 1
       serves fleet 10 (\_ -> pure (pure ()))
-      either show (const "") <$> tryAny (watchingTask fleet ticket (Signal.waitUntil . fmap ((== Done) . state)))
+      either show (const "") <$> tryAny (watchingTask fleet ticket (Signal.waitUntil . fmap ((== Done) . taskState)))
     found `shouldBe` "NotDone Nothing []"
 
   it "A ticket of a database that was lost is that of no task of the restored one" $ do
@@ -526,7 +527,7 @@ startAnsweredAfter late lasts act =
   dayWith defaultFleetOptions {taskTerm = lasts} $ \fake fleet -> do
     sleep 1
     submitting fleet defaultSubmitOptions "a"
-    atomically (answering fake [After late])
+    atomically (willAnswer fake [After late])
     act fake fleet
 
 -- | The database, where each request is answered so.
@@ -548,4 +549,4 @@ carried submits = day $ \_ fleet -> do
   reverse <$> readIORef begun
 
 states :: FakeDatabase -> Behavior [(String, TaskState)]
-states fake = map (\(_, key, task) -> (key, state task)) <$> atomically (tasksThere fake)
+states fake = map (\(_, key, task) -> (key, taskState task)) <$> atomically (tasksThere fake)

@@ -157,7 +157,7 @@ inWorld world = do
   counts <- newTVarIO Map.empty
   generations <- forM (processes world) (\_ -> newTVarIO (0 :: Int))
   parted <- forM (processes world) (\_ -> newTVarIO False)
-  atomically (answering fake (answers world))
+  atomically (willAnswer fake (answers world))
   let orders' = queue "orders" :: Queue Int ()
       staying place fence act = do
         from <- now
@@ -202,15 +202,15 @@ inWorld world = do
           | (i, order) <- zip [0 ..] (orders world)
           ]
         mapM_ (happens fleet) (happenings world)
-        atomically (answering fake [] >> setReachable fake True >> losingNotices fake False)
+        atomically (willAnswer fake [] >> setReachable fake True >> losingNotices fake False)
         -- All is well again: so all ends by itself.
         timeout 300 (finished (length (orders world))) ? pure ()
       sub fleet i order =
-        let chosen = defaultSubmitOptions {pauses = map hundredths (pausesBetween order)}
+        let chosen = defaultSubmitOptions {taskPauses = map hundredths (pausesBetween order)}
          in void (submitWith chosen fleet orders' (orderKey i) i)
       finished n = do
         there <- atomically (tasksThere fake)
-        let over = length [() | (_, _, task) <- there, state task `elem` [Done, Dead, Cancelled]]
+        let over = length [() | (_, _, task) <- there, taskState task `elem` [Done, Dead, Cancelled]]
         if over >= n then sleep 1 else sleep 0.5 >> finished n
       happens fleet (after, what) = sleep (hundredths after) >> case what of
         ConnectionsLost -> atomically (loseConnections fake)
@@ -234,7 +234,7 @@ inWorld world = do
       { taskTerm = 0.75
       , answerWithin = 0.5
       , pollEvery = 1.5
-      , firstPause = 0.02
-      , longestPause = 0.1
+      , connectAgainAfter = 0.02
+      , connectAgainWithin = 0.1
       , noDatabaseAfter = 1000
       }

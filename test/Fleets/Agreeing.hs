@@ -31,14 +31,14 @@ agreeing owner robot seed count = do
   replaceClock admin
   opening (postgres robot) 5 $ \session -> do
     listen session
-    result' <- quickCheckWithResult stdArgs {maxSuccess = count, replay = Just (mkQCGen seed, 0)} $
+    result <- quickCheckWithResult stdArgs {maxSuccess = count, replay = Just (mkQCGen seed, 0)} $
       forAllShrinkShow steps (shrinkList (const [])) (const "") $ \these -> monadicIO $ do
         said <- run (newIORef [])
         ok <- run (tried admin session said these)
         text <- run (readIORef said)
         monitor (counterexample (unlines (reverse text)))
         assert ok
-    pure (isSuccess result')
+    pure (isSuccess result)
 
 -- | The clock is a table.
 replaceClock :: Connection -> IO ()
@@ -76,26 +76,26 @@ tried admin session said these = do
   go (emptyModel, 0, []) these
  where
   go _ [] = pure True
-  go (model, time, starts') (it : others) = case it of
+  go (model, time, starts) (it : others) = case it of
     Passes seconds -> do
       say ("after " ++ show seconds)
       setTime admin (time + seconds)
-      go (model, time + seconds, starts') others
+      go (model, time + seconds, starts) others
     NewEpoch -> do
       say "new epoch"
       void (query_ admin "select fleet.new_epoch()" :: IO [Only Int])
       -- (The notices of another connection come with the next answer.)
       _ <- ask session (Look [])
       _ <- takeNews session
-      go (newEpoch time model, time, starts') others
-    Asks f -> case f starts' of
+      go (newEpoch time model, time, starts) others
+    Asks f -> case f starts of
       asked@(Asked request shown) -> do
         there <- ask session request
         news <- takeNews session
         let (here, after, newsHere) = perform time request model
             (one, other) = (given shown there news, given shown here newsHere)
         say (describe asked ++ "\n   PostgreSQL: " ++ show one ++ "\n   model:      " ++ show other)
-        if one /= other then pure False else go (after, time, newStarts request here ++ starts') others
+        if one /= other then pure False else go (after, time, newStarts request here ++ starts) others
   newStarts :: Request r -> Either Refusal r -> [Start]
   newStarts (Claim _) (Right those) = reverse those
   newStarts (CompleteAndClaim _ _) (Right (_, those)) = reverse those

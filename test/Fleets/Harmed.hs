@@ -66,7 +66,7 @@ harmed say at seed count orders = do
   interrupted <- newTVarIO (0 :: Int)
   tickets <- newTVarIO []
   numbers <- newTVarIO (0 :: Int)
-  let chosen = defaultFleetOptions {firstPause = 0.001, longestPause = 0.001}
+  let chosen = defaultFleetOptions {connectAgainAfter = 0.001, connectAgainWithin = 0.001}
       robots = [Robot ("harmed-" ++ show n) [] | n <- [1 .. 6 :: Int]]
       storm fleet k n = do
         times <- readTVarIO interrupted
@@ -82,7 +82,8 @@ harmed say at seed count orders = do
       act fleet = \case
         Submits -> do
           n <- atomically (stateTVar numbers (\n -> (n, n + 1)))
-          ticket <- submitWith defaultSubmitOptions {pauses = replicate 1000 0} fleet orders ("order " ++ show n) (n, 0)
+          let often = defaultSubmitOptions {taskPauses = replicate 1000 0}
+          ticket <- submitWith often fleet orders ("order " ++ show n) (n, 0)
           say ["submitted", show n]
           atomically (modifyTVar' tickets ((n, ticket) :))
         Serves -> serves fleet
@@ -100,7 +101,7 @@ harmed say at seed count orders = do
     firstOf (void getLine : [withRobot fleet it serves | it <- robots])
 
 isDone :: Signal.Signal Task -> Behavior ()
-isDone = Signal.waitUntil . fmap ((== Done) . state)
+isDone = Signal.waitUntil . fmap ((== Done) . taskState)
 
 oneLine :: SomeException -> String
 oneLine = take 300 . unwords . lines . show
@@ -147,7 +148,7 @@ hostile say at = do
   runBehavior . withFleetOptions defaultFleetOptions {noDatabaseAfter = 5} at (Robot "hostile" []) $ \fleet -> do
     for_ (zip [0 :: Int ..] texts) $ \(n, text) -> trying say ("text " ++ show n) (everywhere fleet text)
     trying say "needs" $
-      submitWith defaultSubmitOptions {needs = manyNeeds} fleet (queue "needs" :: Queue () ()) "needs" ()
+      submitWith defaultSubmitOptions {taskNeeds = manyNeeds} fleet (queue "needs" :: Queue () ()) "needs" ()
     trying say "megabyte" (roundTrip fleet "megabyte" "megabyte" (Text.replicate 1000000 "m"))
     trying say "nothing to hold" (holdingAll fleet [] 1 (\_ -> pure ()))
     trying say "batch" (batch fleet)
@@ -173,7 +174,7 @@ everywhere fleet text = as (Robot (Text.unpack text) [Text.unpack (Text.take 50 
 roundTrip :: Fleet -> Text -> Text -> Text -> Behavior ()
 roundTrip fleet name key input = do
   let texts = queue (Text.unpack name) :: Queue Text Text
-  ticket <- submitWith defaultSubmitOptions {needs = needed} fleet texts (Text.unpack key) input
+  ticket <- submitWith defaultSubmitOptions {taskNeeds = needed} fleet texts (Text.unpack key) input
   firstOf
     [ void (serving fleet texts (pure . pure))
     , watchingTask fleet ticket isDone
@@ -191,20 +192,20 @@ batch fleet = do
         atomically (modifyTVar' arrived (+ 1))
         atomically (readTVar arrived >>= check . (>= 8))
         pure (pure (if n == 5 then "a\0b" else "fine"))
-  tickets <- for [1 .. 8] $ \n -> submitWith defaultSubmitOptions {pauses = []} fleet together (show n) n
+  tickets <- for [1 .. 8] $ \n -> submitWith defaultSubmitOptions {taskPauses = []} fleet together (show n) n
   firstOf
     [ void (allOf [withRobot fleet it (\mine -> serving mine together gives) | it <- robots])
-    , for_ tickets $ \ticket -> watchingTask fleet ticket (Signal.waitUntil . fmap ((`elem` [Done, Dead]) . state))
+    , for_ tickets $ \ticket -> watchingTask fleet ticket (Signal.waitUntil . fmap ((`elem` [Done, Dead]) . taskState))
     ]
 
 -- | A task that reports what cannot be stored.
 reporting :: Fleet -> Behavior ()
 reporting fleet = do
   let these = queue "progress" :: Queue () ()
-  ticket <- submitWith defaultSubmitOptions {pauses = []} fleet these "progress" ()
+  ticket <- submitWith defaultSubmitOptions {taskPauses = []} fleet these "progress" ()
   firstOf
     [ void (servingWith fleet these (\work -> reportProgress work (String "a\0b") >> pure (pure ())))
-    , watchingTask fleet ticket (Signal.waitUntil . fmap ((== Dead) . state))
+    , watchingTask fleet ticket (Signal.waitUntil . fmap ((== Dead) . taskState))
     ]
 
 -- | Two robots serve the queue "numbers", until both the good and the bad tasks have ended.

@@ -122,7 +122,7 @@ showing contents use = inFolder $ \folder -> do
   Bytes.writeFile path (mconcat contents)
   (waits, goesOn) <- (,) <$> newEmptyTMVarIO <*> newEmptyTMVarIO
   let pause = atomically (putTMVar waits ()) >> atomically (takeTMVar goesOn)
-  withAsync (showFile pause loopback {robot = "Ann.jsonl", pagePort = port} path) $ \shown -> do
+  withAsync (showFile pause loopback {pageRobot = "Ann.jsonl", pagePort = port} path) $ \shown -> do
     let orOver act = atomically (act `orElse` void (waitSTM shown))
     orOver (takeTMVar waits)
     use port path (atomically (putTMVar goesOn ()) >> orOver (takeTMVar waits)) shown

@@ -269,7 +269,7 @@ spec = around_ (timeout 60000000 >=> maybe (expectationFailure "not over after 6
 
 -- | A hub of these robots. The action is given the variable that has them, and the port.
 showing :: [(String, String)] -> (TVar [(String, String)] -> Int -> IO a) -> IO a
-showing = withHub loopback {robot = "fleet"}
+showing = withHub loopback {pageRobot = "fleet"}
 
 withHub :: LivePage -> [(String, String)] -> (TVar [(String, String)] -> Int -> IO a) -> IO a
 withHub page these use = do

@@ -23,5 +23,5 @@ agreeing campaign = withBridge campaign 1 $ \bridge way -> do
   awaitServers campaign 16 way ["/fast", "/stubborn", "/steady", "/brief", "/picky"]
   for_ cases $ \it -> do
     let host ros = Host ros (endBridge sigKILL bridge) (startBridge campaign bridge)
-    gave <- tryAny (timeout 20 (withRosWith impatient {patience = 2} way (mission it . host)))
+    gave <- tryAny (timeout 20 (withRosOptions impatient {patience = 2} way (mission it . host)))
     note campaign 16 ["case" .= title it, "gave" .= either (pure . displayException) id gave, "expected" .= outcome it]

@@ -96,7 +96,7 @@ awaitServers campaign row bridge names =
 -- | The same for any servers: each with what sends it a goal, and runs that behaviour when its feedback comes.
 awaitReached :: Campaign -> Row -> Transport -> [(String, Ros -> Behavior () -> Sending)] -> Behavior ()
 awaitReached campaign row bridge servers =
-  withRosWith defaultRosOptions {patience = 0.1} bridge $ \ros -> for_ servers $ \(name, send) -> do
+  withRosOptions defaultRosOptions {patience = 0.1} bridge $ \ros -> for_ servers $ \(name, send) -> do
     reached <- newTVarIO False
     let reach = atomically (writeTVar reached True)
         go n = do

@@ -36,7 +36,7 @@ hostile :: Campaign -> Behavior ()
 hostile campaign = withLies campaign ["hostile", "10000"] $ \way -> do
   reported <- newTBQueueIO 16
   let options = defaultRosOptions {onReport = atomically . writeTBQueue reported}
-  withRosWith options way $ \ros -> do
+  withRosOptions options way $ \ros -> do
     awaitBridge ros
     let readings = topic "/readings" latched :: Topic (Std (Maybe Double))
         judging = tryAny (Signal.read ((< 0.1) <$> measured unStd (latest ros readings)))

@@ -45,7 +45,7 @@ killed campaign = withBridge campaign 1 $ \bridge way -> withRos way $ \ros -> d
 -- | Half-open: the bridge is there, and is silent.
 halfOpen :: Campaign -> Behavior ()
 halfOpen campaign = withBridge campaign 1 $ \bridge way ->
-  withRosWith defaultRosOptions {pingEvery = 0.5, pongWithin = 0.5} way $ \ros -> do
+  withRosOptions defaultRosOptions {pingEvery = 0.5, pongWithin = 0.5} way $ \ros -> do
     awaitServers campaign 6 way ["/steady"]
     replicateM_ (if isLong campaign then 30 else 6) $ do
       awaitBridge ros

@@ -16,7 +16,7 @@ import RosMission
 
 -- | One after the other; the robot draws the state of its doors, and when its battery falls low.
 missions :: Campaign -> Behavior ()
-missions campaign = withBridge campaign 1 $ \_ bridge -> withRosWith quickly bridge $ \ros -> do
+missions campaign = withBridge campaign 1 $ \_ bridge -> withRosOptions quickly bridge $ \ros -> do
   awaitBridge ros
   let prepare = void (call ros (untypedService "/new_mission" "std_srvs/srv/Trigger") (object []))
   -- (A bridge that has just started loses calls, and goals, until it knows their servers.)

@@ -214,7 +214,7 @@ spec = guarded $ do
     offerService robot "/lights" script >> act robot ros
   withRobot = underSchedules 40 . onRobot
   onRobot act = withFakeRobot [] $ \robot ->
-    withRosWith defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
+    withRosOptions defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
   later wanted = case wanted of
     Number n -> ServiceScript (realToFrac n) (Right wanted)
     _ -> ServiceScript 0 (Right Null)

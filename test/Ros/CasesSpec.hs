@@ -17,10 +17,11 @@ spec :: Spec
 spec = guarded . for_ cases $ \each -> describe (title each) $ do
   it "with a fake robot, under many schedules" . underSchedules 40 . withFakeRobot servers $ \robot -> do
     let host ros = Host ros (loseLink robot) (restoreLink robot)
-    withRosWith impatient (fakeRos robot) (mission each . host) >>= (`shouldBe` outcome each)
+    withRosOptions impatient (fakeRos robot) (mission each . host) >>= (`shouldBe` outcome each)
   it "with a bridge in another process" . withBridgeProcess $ \way cuts mends -> do
     let host ros = Host ros cuts mends
-    withRosWith (if isInVain each then impatient else patient) way (mission each . host) >>= (`shouldBe` outcome each)
+    withRosOptions (if isInVain each then impatient else patient) way (mission each . host)
+      >>= (`shouldBe` outcome each)
  where
   -- (There something is waited for that never comes.)
   isInVain each = any (`elem` outcome each) ["NotConfirmed", "LinkLost"]

@@ -165,8 +165,8 @@ spec = guarded $ do
     forM_ [("ws://127.0.0.1:18446744073709560706", False)] allowed
   describe "A duration" $
     it "is not negative" $
-      withFakeRobot [] (\robot -> withRosWith defaultRosOptions {patience = -1} (fakeRos robot) (\_ -> pure ()))
-        `shouldThrow` errorCall "withRosWith: a duration is zero or more seconds, not -1.0"
+      withFakeRobot [] (\robot -> withRosOptions defaultRosOptions {patience = -1} (fakeRos robot) (\_ -> pure ()))
+        `shouldThrow` errorCall "withRosOptions: a duration is zero or more seconds, not -1.0"
  where
   has text frame = text `isInfixOf` Chars.unpack frame
   limits = Limits 1000 64
@@ -190,7 +190,7 @@ onSlowBridge pause act = do
         use (Connection ended (pure 0) takes received closes)
       ended = atomically (readTVar over >>= check) >> throwIO (userError "it was closed")
       counts = publication "/count" :: Publication (Std (Maybe Double))
-  end <- try . timeout 60 . withRosWith defaultRosOptions {patience = 10, pingEvery = 1000} way $ \ros ->
+  end <- try . timeout 60 . withRosOptions defaultRosOptions {patience = 10, pingEvery = 1000} way $ \ros ->
     publishing ros counts $ \say -> act ros (forM_ [1 .. 50] (say . Std . Just))
   case end of
     Left (NotConfirmed "/carry" _) -> pure ()

@@ -149,7 +149,7 @@ spec = guarded $ do
   say robot n = publish robot "/numbers" (toRos (Std (n :: Int32)))
   withRobot = withRobotUnder 40
   withRobotUnder schedules act = underSchedules schedules . withFakeRobot [] $ \robot ->
-    withRosWith defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
+    withRosOptions defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
   tried :: Behavior a -> Behavior (Either RosFault a)
   tried = try
 

@@ -230,7 +230,7 @@ inWorld world = do
   withFakeRobot [(name, scripted) | name <- actionNames] $ \robot -> do
     when (serial world) (workSerially robot)
     charge robot events High
-    limited . withRosWith options (fakeRos robot) $ \ros -> do
+    limited . withRosOptions options (fakeRos robot) $ \ros -> do
       let doing = Doing robot ros events ended orders
           day = for_ (phases world) (\phase -> tryAny (run doing False phase) >> pause 3)
       firstOf [day, traverse_ (happen robot events) (happenings world) >> sleepForever]

@@ -94,7 +94,7 @@ spec = guarded $ do
     it "test_timeouts: fails after the time that was set, if there is no server" . underSchedules 100 $
       withFakeRobot [] $ \robot -> do
         loseLink robot
-        withRosWith defaultRosOptions {noServerAfter = 0.1} (fakeRos robot) $ \ros ->
+        withRosOptions defaultRosOptions {noServerAfter = 0.1} (fakeRos robot) $ \ros ->
           inSeconds 0.1 (try (dock ros True)) >>= (`shouldBe` Left noLink)
 
 -- | A robot with a server of nav2's test: it counts with that period, and looks as often whether it is to stop; goals
@@ -114,7 +114,7 @@ counting period accepting = withServer $ \wanted ->
 -- | A robot with that server.
 withServer :: (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 withServer script act = withFakeRobot [("/fibonacci", script), ("/dock", script)] $ \robot ->
-  withRosWith defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
+  withRosOptions defaultRosOptions {pingEvery = 10} (fakeRos robot) (act robot)
 
 count :: Ros -> Int32 -> Behavior Sequence
 count ros = goal ros (action "/fibonacci" :: Action Fibonacci) . Order

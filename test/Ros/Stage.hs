@@ -39,7 +39,7 @@ mission = missionWith defaultRosOptions {pingEvery = 10}
 
 missionWith :: RosOptions -> (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 missionWith options script act =
-  withFakeRobot [("/carry", script)] $ \robot -> withRosWith options (fakeRos robot) (act robot)
+  withFakeRobot [("/carry", script)] $ \robot -> withRosOptions options (fakeRos robot) (act robot)
 
 -- | The behaviour ends without an exception, within ten minutes, under each of that many random schedules, and under
 -- the one without pre-emptions.

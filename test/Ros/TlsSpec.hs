@@ -74,7 +74,7 @@ encrypted = beforeAll (withOpenSSL (generateRSAKey' 2048 65537)) $ do
 over :: Server -> (String -> Transport) -> RosOptions -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 over server way options act =
   withFakeRobot [("/carry", const succeeding {endsWith = Succeeds "a cup"})] $ \robot ->
-    withBridgeOver server robot (\port -> withRosWith options (way port) (act robot))
+    withBridgeOver server robot (\port -> withRosOptions options (way port) (act robot))
 
 -- | With that key, and the certificate in that file.
 tlsServer :: RSAKeyPair -> FilePath -> Server

@@ -69,7 +69,7 @@ spec = guarded $ do
     withFakeRobot [] $ \robot -> withBridge robot $ \bridgeAddress ->
       forM_ [1 .. 30] $ \n -> do
         let speed = publication "/speed" :: Publication (Std (Maybe Double))
-        withRosWith patient (rosbridge bridgeAddress) (\ros -> publishing ros speed ($ Std (Just n)))
+        withRosOptions patient (rosbridge bridgeAddress) (\ros -> publishing ros speed ($ Std (Just n)))
         came <- map snd <$> atomically (seen robot)
         came `shouldContain` [Published "/speed" (object ["data" .= n])]
   it "goals of two links have different names" $
@@ -79,7 +79,7 @@ spec = guarded $ do
           observed one = one {sendFrame = \frame -> keeping frame >> sendFrame one frame}
           way = rosbridge url
           watched = way {connecting = \bytes pong use -> connecting way bytes pong (use . observed)}
-      forM_ [1, 2 :: Int] $ \_ -> withRosWith patient watched (`carrying` "cup")
+      forM_ [1, 2 :: Int] $ \_ -> withRosOptions patient watched (`carrying` "cup")
       sent <- map (decodeRequest (Limits 10000 64)) <$> readTVarIO frames
       let names = [n | Right (SendGoal n _ _ _) <- sent]
       length names `shouldBe` 2
@@ -101,7 +101,7 @@ spec = guarded $ do
         arrives = do
           atomically $ (&&) <$> ((>= 8) <$> readTVar pings) <*> readTVar isSubscribed >>= check
           putMVar arriving "{\"op\":\"publish\",\"topic\":\"/level\",\"msg\":{\"data\":0.5}}"
-    withRosWith defaultRosOptions {pingEvery = 0.01, pongWithin = 0.01} way $ \ros ->
+    withRosOptions defaultRosOptions {pingEvery = 0.01, pongWithin = 0.01} way $ \ros ->
       arrives `both` do
         level <- Signal.read (latest ros (topic "/level" latched))
         level `shouldBe` Std (Just 0.5 :: Maybe Double)
@@ -120,14 +120,14 @@ spec = guarded $ do
               bytesCame = readTVar pings
             , sendClose = pure ()
             }
-    withRosWith defaultRosOptions {pingEvery = 0.01, pongWithin = 5} way $ \ros -> do
+    withRosOptions defaultRosOptions {pingEvery = 0.01, pongWithin = 5} way $ \ros -> do
       level <- Signal.read (latest ros (topic "/level" latched))
       level `shouldBe` Std (Just 0.5 :: Maybe Double)
   it "a publisher ends although the bridge takes nothing" $ do
     let stuck = Connection sleepForever (pure 0) (const sleepForever) sleepForever sleepForever
         speed = publication "/speed" :: Publication (Std (Maybe Double))
         full ros = atomically (isFullTBQueue (outgoing ros) >>= check)
-    withRosWith patient {pingEvery = 1000} (Transport "stuck" Nothing (pure "") (\_ _ use -> use stuck)) $ \ros ->
+    withRosOptions patient {pingEvery = 1000} (Transport "stuck" Nothing (pure "") (\_ _ use -> use stuck)) $ \ros ->
       publishing ros speed (\say -> full ros ||| forever (say (Std (Just 1))))
   it "an answer to the handshake that does not end is refused" $
     bracket (Websockets.makeListenSocket "127.0.0.1" 0) close $ \listening -> do
@@ -136,7 +136,7 @@ spec = guarded $ do
             (socket, _) <- accept listening
             tryAny (sendAll socket "HTTP/1.1 101 x\r\nx: " >> forever (sendAll socket (Chars.replicate 4096 'a')))
               >> close socket
-          toPort = withRosWith defaultRosOptions {noServerAfter = 0.5} (rosbridge ("ws://127.0.0.1:" ++ show port))
+          toPort = withRosOptions defaultRosOptions {noServerAfter = 0.5} (rosbridge ("ws://127.0.0.1:" ++ show port))
       end <- servedBy endless (try (toPort (`carrying` "cup")))
       case end of
         Left (NoServer _ why) -> why `shouldContain` "64 KiB"
@@ -160,4 +160,4 @@ onSocket = onSocketWith patient
 onSocketWith :: RosOptions -> (Value -> GoalScript) -> (FakeRobot -> Ros -> Behavior a) -> Behavior a
 onSocketWith options script act =
   withFakeRobot [("/carry", script)] $ \robot ->
-    withBridge robot (\bridgeAddress -> withRosWith options (rosbridge bridgeAddress) (act robot))
+    withBridge robot (\bridgeAddress -> withRosOptions options (rosbridge bridgeAddress) (act robot))

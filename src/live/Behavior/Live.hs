@@ -1,7 +1,7 @@
 -- |
 -- The live page: what a robot does, in a browser, while it does it.
 --
--- > main = runBehavior (viewing defaultViewing {livePage = Just loopback {robot = "Ann"}} mission)
+-- > main = runBehavior (viewing defaultViewing {livePage = Just loopback {pageRobot = "Ann"}} mission)
 --
 -- prints the address of a page with the tree of what runs, the timeline, and what was interrupted, and why. It can be
 -- opened at any time. The page only shows: a reader can change nothing in the mission. @docs\/live-page.md@
@@ -92,7 +92,7 @@ withoutPage v =
 -- @since 0.1.0.0
 withLive :: LivePage -> (([Event] -> IO ()) -> IO a) -> IO a
 withLive page use = withListener page without $ \listener -> do
-  thisRun <- Run (robot page) <$> newRunName <*> getCurrentTime
+  thisRun <- Run (pageRobot page) <$> newRunName <*> getCurrentTime
   begun <- Seconds <$> getMonotonicTime
   showing listener (newShown defaultLimits thisRun (const (subtract begun . Seconds <$> getMonotonicTime))) $ \shown ->
     use (receive shown . map (relativeTo begun))

@@ -24,7 +24,7 @@ module Behavior.Ros
   , rosbridgeAnywhere
 
     -- ** What can be set
-  , withRosWith
+  , withRosOptions
   , RosOptions (..)
   , defaultRosOptions
 

@@ -100,7 +100,7 @@ launch sim starter name body publish = do
   task <- enlist sim starter name (Just (asyncThreadId thread, entrance)) Unstarted
   pure (task, thread)
 
-enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> Position -> IO Task
+enlist :: Sim -> Int -> Label -> Maybe (ThreadId, MVar ()) -> BlockedAt -> IO Task
 enlist sim starter name thread here = do
   entrance <- maybe newEmptyMVar (pure . snd) thread
   n <- readIORef (nextNumber sim)

@@ -19,7 +19,7 @@ module Behavior.Internal.Sim.State
     -- * Tasks
   , Task (..)
   , newTask
-  , Position (..)
+  , BlockedAt (..)
   , Operation (..)
   , EnabledCache (..)
   , Pending (..)
@@ -116,7 +116,7 @@ data Task = Task
   , taskLabel :: !Label
   , taskThread :: !(Maybe ThreadId)
   , gate :: !(MVar ())
-  , blockedAt :: !(IORef Position)
+  , blockedAt :: !(IORef BlockedAt)
   , pendingException :: !(IORef (Maybe SomeException))
   -- ^ An exception that it can receive where it is blocked: it raises this in its next turn.
   , pending :: !(IORef [Pending])
@@ -125,7 +125,7 @@ data Task = Task
   }
 
 -- | Where a task is blocked while it does not have the turn.
-data Position
+data BlockedAt
   = Unstarted
   | Before !MaskingState !Operation
   | Gone
@@ -199,7 +199,7 @@ newSim options policyOf = do
 
 -- | A task that has this number, label, thread and gate, was started by the task with that number, and is blocked
 -- here.
-newTask :: Int -> Label -> Maybe ThreadId -> MVar () -> Int -> Position -> IO Task
+newTask :: Int -> Label -> Maybe ThreadId -> MVar () -> Int -> BlockedAt -> IO Task
 newTask taskNumber taskLabel taskThread gate parent here = do
   blockedAt <- newIORef here
   pendingException <- newIORef Nothing

@@ -17,7 +17,7 @@ module Behavior.Fleet.Fake
 
     -- * What goes wrong there
   , Answer (..)
-  , answering
+  , willAnswer
   , setClock
   , loseConnections
   , setReachable

@@ -3,7 +3,7 @@
 -- |
 -- One live page for many robots.
 --
--- > main = runBehavior (hub loopback {robot = "fleet", pagePort = 8410} robots >>= putStrLn)
+-- > main = runBehavior (hub loopback {pageRobot = "fleet", pagePort = 8410} robots >>= putStrLn)
 -- >  where
 -- >   robots = pure [("Ann", "http://127.0.0.1:8420/"), ("Bob", "http://127.0.0.1:8421/")]
 --
@@ -62,7 +62,7 @@ hub page wanted = withListener page (pure . ("no page: " ++)) $ \listener@(Liste
           }
   firstOf
     [ following wanted robots
-    , every 0.3 (publishing (robot page) robots current)
+    , every 0.3 (publishing (pageRobot page) robots current)
     , "no page: its server has ended" <$ serve listener (application site)
     ]
 

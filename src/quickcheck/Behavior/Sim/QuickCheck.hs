@@ -9,7 +9,7 @@
 -- >>> import Test.QuickCheck
 --
 -- >>> :{
--- quickCheck . forAll durations $ \(s, t) -> underSchedules $ \simulate -> do
+-- quickCheck . forAll anyDurations $ \(s, t) -> underSchedules $ \simulate -> do
 --   run <- simulate (both (sleep s) (sleep t))
 --   pure (finished run === max s t)
 -- :}
@@ -22,8 +22,8 @@ module Behavior.Sim.QuickCheck
     -- * Generators
   , anySchedule
   , shrinkSchedule
-  , durations
-  , duration
+  , anyDurations
+  , anyDuration
   ) where
 
 import Control.Exception (Exception (..), SomeAsyncException, throwIO)
@@ -180,11 +180,11 @@ shrinkSchedule _ = [NonPreemptive]
 -- | Two durations that are often equal.
 --
 -- @since 0.1.0.0
-durations :: Gen (Seconds, Seconds)
-durations = (,) <$> duration <*> duration
+anyDurations :: Gen (Seconds, Seconds)
+anyDurations = (,) <$> anyDuration <*> anyDuration
 
 -- | A duration of 0, 1, 2, 3, 4 or 5 seconds: so that ties are frequent.
 --
 -- @since 0.1.0.0
-duration :: Gen Seconds
-duration = fromIntegral <$> choose (0, 5 :: Int)
+anyDuration :: Gen Seconds
+anyDuration = fromIntegral <$> choose (0, 5 :: Int)

@@ -159,12 +159,14 @@ data TaskState
   deriving (Bounded, Enum, Eq, Ord, Show)
 
 -- | What is known of a task.
+--
+-- @since 0.1.0.0
 data Task = Task
-  { state :: TaskState
-  , starts :: Int
-  , progress :: Maybe Value
-  , result :: Maybe Value
-  , reasons :: [String]
+  { taskState :: TaskState
+  , taskStarts :: Int
+  , taskProgress :: Maybe Value
+  , taskResult :: Maybe Value
+  , taskReasons :: [String]
   -- ^ Why its starts failed.
   }
   deriving (Eq, Show)

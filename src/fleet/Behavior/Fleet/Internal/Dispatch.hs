@@ -37,7 +37,7 @@ import Behavior.STM (atomically)
 -- | A robot that is to wait for a task of this queue. It does not wait yet.
 newSeeker :: Fleet -> Text -> Behavior Seeker
 newSeeker fleet name = atomically $ do
-  group <- groupOf fleet name (Set.fromList (map Text.pack (skills it)))
+  group <- groupOf fleet name (Set.fromList (map Text.pack (robotSkills it)))
   Seeker (Text.pack (robotName it)) group <$> newTVar False <*> newTVar (Just Nothing)
  where
   it = robot fleet

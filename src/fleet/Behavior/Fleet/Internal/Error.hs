@@ -59,7 +59,7 @@ data FleetFault
     -- done.
     WrongSchema String
   | -- | What a task's result should be, and is not.
-    Undecodable String String
+    UndecodableResult String String
   deriving (Eq, Show)
 
 instance Exception FleetFault where
@@ -67,7 +67,7 @@ instance Exception FleetFault where
     LeaseLost what -> "the lease of " ++ what ++ " is lost"
     RestoredFromCopy why -> why
     WrongSchema why -> why
-    Undecodable what why -> what ++ " is not what was expected: " ++ why
+    UndecodableResult what why -> what ++ " is not what was expected: " ++ why
 
 -- | A connection is of no use any more, and why. (It never leaves the library.)
 data ConnectionLost

@@ -11,7 +11,7 @@ module Behavior.Fleet.Internal.FakeDatabase
   , newFakeDatabase
   , fakeDatabase
   , Answer (..)
-  , answering
+  , willAnswer
   , setClock
   , fakeDatabaseBy
   , cutOff
@@ -91,8 +91,8 @@ newFakeDatabase =
 -- | The next statements are answered so, and those after them at once.
 --
 -- @since 0.1.0.0
-answering :: FakeDatabase -> [Answer] -> STM ()
-answering = writeTVar . answers
+willAnswer :: FakeDatabase -> [Answer] -> STM ()
+willAnswer = writeTVar . answers
 
 -- | The database's clock, of the run's time. (It may jump.)
 --

@@ -67,7 +67,7 @@ import Behavior.Time (cleanupWithin, timeout)
 data Robot = Robot
   { robotName :: String
   -- ^ Of its own, of 1 to 200 characters: no two robots of a fleet have the same.
-  , skills :: [String]
+  , robotSkills :: [String]
   -- ^ Each of 1 to 50 characters.
   }
   deriving (Eq, Show)
@@ -233,13 +233,13 @@ withNotices :: Fleet -> [Notice] -> (STM () -> Behavior a) -> Behavior a
 withNotices fleet about use = bracket enter (const leave) (use . change)
  where
   enter = atomically $ do
-    modifyTVar' (changes fleet) (\all' -> foldr (Map.alter (Just . maybe (1, 0) (first (+ 1)))) all' about)
+    modifyTVar' (changes fleet) (\them -> foldr (Map.alter (Just . maybe (1, 0) (first (+ 1)))) them about)
     counts >>= newTVar
-  leave = atomically $ modifyTVar' (changes fleet) (\all' -> foldr (Map.update fewer) all' about)
+  leave = atomically $ modifyTVar' (changes fleet) (\them -> foldr (Map.update fewer) them about)
   fewer (waiting, count) = if waiting == 1 then Nothing else Just (waiting - 1 :: Int, count)
   counts = do
-    all' <- readTVar (changes fleet)
-    (,) (map (fmap snd . (`Map.lookup` all')) about) <$> readTVar (missed fleet)
+    them <- readTVar (changes fleet)
+    (,) (map (fmap snd . (`Map.lookup` them)) about) <$> readTVar (missed fleet)
   change latest = do
     new <- counts
     readTVar latest >>= check . (/= new)

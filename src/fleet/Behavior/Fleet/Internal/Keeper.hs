@@ -1,7 +1,7 @@
 {-# OPTIONS_HADDOCK not-home #-}
 
 -- |
--- The threads of a process's fleet. No user's code runs in them, but for 'onReport'.
+-- The threads of a process's fleet. No user's code runs in them, but for 'onFleetReport'.
 --
 -- Internal: any of it may change in any release.
 module Behavior.Fleet.Internal.Keeper
@@ -98,7 +98,7 @@ withRobot fleet it behavior = do
 -- | Refuses a robot that the database would refuse.
 requireAllowed :: Robot -> Behavior ()
 requireAllowed it =
-  mapM_ (throwIO . NotAllowed . Text.unpack) (whyNotRobot (Text.pack (robotName it)) (map Text.pack (skills it)))
+  mapM_ (throwIO . NotAllowed . Text.unpack) (whyNotRobot (Text.pack (robotName it)) (map Text.pack (robotSkills it)))
 
 keepers :: Fleet -> [Behavior ()]
 keepers fleet =
@@ -160,4 +160,4 @@ leaving fleet = do
   when there $ posted fleet listening (Leave (processId fleet))
 
 reporting :: Fleet -> Behavior a
-reporting fleet = forever (atomically (readTBQueue (reports fleet)) >>= onReport (options fleet))
+reporting fleet = forever (atomically (readTBQueue (reports fleet)) >>= onFleetReport (options fleet))

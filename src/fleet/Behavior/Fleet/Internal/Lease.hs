@@ -111,13 +111,13 @@ renewing leases clock renew keep = forever $ do
   names <- atomically $ do
     urgent <- swapTVar (isUrgent leases) False
     -- (One statement is for many: so also for those that are halfway there.)
-    valid leases >>= if urgent then pure else filterM' (fmap (<= asked) . at (1 / 6))
+    valid leases >>= if urgent then pure else those (fmap (<= asked) . at (1 / 6))
   let (tasks, wishes) = Map.partitionWithKey (\name _ -> isOfStart name) names
   -- (What throws is tried again, and is not in the way of the other one. The leases end by themselves.)
   areAnswered <- (&&) <$> answered asked renewed tasks <*> answered asked kept wishes
   unless areAnswered $ sleep (minimum (term <$> names) / 20)
  where
-  filterM' keeps these = Map.fromList <$> filterM (keeps . snd) (Map.toList these)
+  those keeps these = Map.fromList <$> filterM (keeps . snd) (Map.toList these)
   isOfStart = \case OfStart _ _ -> True; OfWish _ -> False
   renewed names = do
     gave <- renew [(task, n) | OfStart task n <- names]

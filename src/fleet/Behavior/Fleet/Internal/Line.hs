@@ -35,7 +35,7 @@ import Behavior.Time (now)
 
 -- | A connection, whenever there is one.
 data Line = Line
-  { place :: TVar Place
+  { place :: TVar Whereabouts
   , lastWhy :: TVar String
   , lineOptions :: FleetOptions
   , askedFirst, asked :: TQueue (Behavior ())
@@ -43,7 +43,7 @@ data Line = Line
   }
 
 -- | Where the connection is.
-data Place
+data Whereabouts
   = Nowhere
   | -- | Nowhere, and who asks for it is to have this fault.
     Refusing SomeException
@@ -76,7 +76,7 @@ isAwayFor = writeTVar . lastWhy
 -- changes, and when there is one again.
 keeping
   :: Database -> Line -> (Maybe String -> STM ()) -> (Session -> Behavior ()) -> (Session -> Behavior ()) -> Behavior a
-keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go said (firstPause options) firstLimit
+keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go said (connectAgainAfter options) firstLimit
  where
   options = lineOptions line
   go said pause limit = do
@@ -96,9 +96,9 @@ keeping database line say prepare beside = newTVarIO Nothing >>= \said -> go sai
       unless (isNothing why || why == before) (writeTVar said why >> say why)
     lasted <- maybe (const 0) subtract <$> readTVarIO usedFrom <*> now
     sleep pause
-    if lasted > longestPause options
-      then go said (firstPause options) firstLimit
-      else go said (min (longestPause options) (2 * pause)) $
+    if lasted > connectAgainWithin options
+      then go said (connectAgainAfter options) firstLimit
+      else go said (min (connectAgainWithin options) (2 * pause)) $
         if isSlow ended then min longestLimit (2 * limit) else limit
   used said session = do
     atomically $ do

@@ -136,6 +136,7 @@ alone connection act = losing $ do
   -- (Names mean what PostgreSQL means by them, whatever is in other schemas.)
   run connection "begin isolation level read committed read write"
   run connection "set local search_path = pg_catalog, pg_temp; set local lock_timeout = '10s'"
+  -- (The number is arbitrary: another program's lock is unlikely to have it.)
   void (query_ connection "select pg_advisory_xact_lock(7310579634563)::text" :: IO [Only Text])
   a <- act
   a <$ run connection "commit"
@@ -155,12 +156,12 @@ found connection = do
   version = do
     isOurs <- one connection
       "select exists (select from pg_attribute where attrelid = to_regclass('fleet.about') and attname = 'version')"
-    unless isOurs (refuse odd')
+    unless isOurs (refuse damaged)
     rows <- query_ connection "select version::text from fleet.about"
     case [v | Only (Just it) <- rows, Just v <- [readMaybe it]] of
       [v] | length rows == 1, v >= 1 -> v <$ requireWhole connection v
-      _ -> refuse odd'
-  odd' =
+      _ -> refuse damaged
+  damaged =
     "the schema fleet of this database is not one that behavior-fleet has created, or it is damaged (it does not say \
     \its version): use another database, or restore this one from a copy"
 

@@ -47,12 +47,12 @@ doing at = \case
     (,) newest <$> getting epoch
   Submit it -> requireEpoch >> submit at it
   Claim it -> requireEpoch >> claim at it
-  Renew starts' -> requireEpoch >> concat <$> traverse (uncurry (renew at)) starts'
+  Renew starts -> requireEpoch >> concat <$> traverse (uncurry (renew at)) starts
   Complete ends -> requireEpoch >> completeSome ends
   CompleteAndClaim ends it -> requireEpoch >> (,) <$> completeSome ends <*> claim at it
   Fail n l why -> running n l >>= \row -> startEnded at n row why True
   GiveBack n l -> running n l >>= \row -> startEnded at n row "given back" False
-  Report n l what -> running n l >>= \row -> put n row {task = (task row) {progress = Just what}} >> tellTask n row
+  Report n l what -> running n l >>= \row -> put n row {task = (task row) {taskProgress = Just what}} >> tellTask n row
   Became n l -> requireEpoch >> became n l
   Look numbers -> requireEpoch >> look numbers
   Find name its -> requireEpoch >> fmap fst <$> find name its its
@@ -69,7 +69,7 @@ doing at = \case
       refuse "a process has a number of its own, and polls every 0 seconds to 1 day"
     change (\m -> m {places = Map.filter ((>= at - 60) . placeUntil) (places m)})
     next <- sweep at
-    waiting <- getting (filter ((== Waiting) . state . task) . Map.elems . rows)
+    waiting <- getting (filter ((== Waiting) . taskState . task) . Map.elems . rows)
     pure (next, Set.toList (Set.fromList (map (toQueue . submitted) waiting)))
   Leave _ -> pure ()
  where
@@ -81,7 +81,7 @@ newEpoch at = execState . runExceptT $ do
   change (\m -> m {epoch = next m, isRestored = False, places = Map.empty})
   first <- getting (\m -> fromIntegral (epoch m) * perEpoch)
   change (\m -> m {nextNumber = Number first, nextRow = TaskNumber first})
-  started <- getting (filter ((== Running) . state . task . snd) . Map.toList . rows)
+  started <- getting (filter ((== Running) . taskState . task . snd) . Map.toList . rows)
   forM_ started $ \(n, row) -> startEnded at n row "the database was restored from a copy" False
   change (\m -> m {holdsFrom = at + maximum (60 : map holderTerm (Map.elems (resources m)))})
   change (\m -> m {resources = (\h -> h {heldUntil = holdsFrom m, holderRequest = Nothing}) <$> resources m})

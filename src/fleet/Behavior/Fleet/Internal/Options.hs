@@ -29,14 +29,14 @@ data FleetOptions = FleetOptions
   -- by default. An infinite time is no limit. (Serving a queue waits for as long as it takes.)
   , pollEvery :: Seconds
   -- ^ How often the process asks for what it may have missed, and says that it is there; 5 s by default.
-  , firstPause :: Seconds
+  , connectAgainAfter :: Seconds
   -- ^ The pause before it connects again, which grows to twice as much each time; 0.1 s by default.
-  , longestPause :: Seconds
+  , connectAgainWithin :: Seconds
   -- ^ The longest such pause; 2 s by default.
   , pageAddress :: Maybe String
   -- ^ The address of this process's live page, for those who look at the fleet, and for @behavior-fleet hub@; none by
   -- default.
-  , onReport :: String -> Behavior ()
+  , onFleetReport :: String -> Behavior ()
   -- ^ What is done with a line about the connection, or about a start of a task that has failed; nothing by default.
   }
 
@@ -50,10 +50,10 @@ defaultFleetOptions =
     , answerWithin = 2
     , noDatabaseAfter = 60
     , pollEvery = 5
-    , firstPause = 0.1
-    , longestPause = 2
+    , connectAgainAfter = 0.1
+    , connectAgainWithin = 2
     , pageAddress = Nothing
-    , onReport = \_ -> pure ()
+    , onFleetReport = \_ -> pure ()
     }
 
 -- | What is wrong with the first of these that is not allowed.
@@ -66,8 +66,8 @@ notAllowed chosen =
         , ("answerWithin", answerWithin chosen, 0.01, 3600)
         , ("noDatabaseAfter", noDatabaseAfter chosen, 0.01, 1 / 0)
         , ("pollEvery", pollEvery chosen, 0.1, 3600)
-        , ("firstPause", firstPause chosen, 0.001, 3600)
-        , ("longestPause", longestPause chosen, firstPause chosen, 3600)
+        , ("connectAgainAfter", connectAgainAfter chosen, 0.001, 3600)
+        , ("connectAgainWithin", connectAgainWithin chosen, connectAgainAfter chosen, 3600)
         ]
     , not (seconds >= least && seconds <= most)
     ]

@@ -140,8 +140,8 @@ underway fleet (Queue name) next start lease behavior =
     insteadWhen (named "lease lost or task cancelled" (watching ((/= Valid) <$> standing lease))) ending $ do
       input <- either notExpected pure (decoded (startInput start))
       wanted <- behavior (Work (Text.unpack (startKey start)) input (startCount start) progressing)
-      isDone' <- completing fleet next start wanted
-      pure (if isDone' then Completed else LostIt)
+      hasCompleted <- completing fleet next start wanted
+      pure (if hasCompleted then Completed else LostIt)
  where
   ending = atomically (standing lease) >>= \case
     LeaseIsLost -> pure LostIt

@@ -65,7 +65,7 @@ called connection = \case
         "select * from fleet.complete_some(?::bigint[], ?::bigint[], ?::jsonb[])"
         (PGArray [t | (t, _, _) <- ends], PGArray [n | (_, n, _) <- ends], PGArray [it | (_, _, it) <- ends])
   CompleteAndClaim ends it ->
-    partitionEithers . map either'
+    partitionEithers . map isHere
       <$> query
         connection
         "select * from fleet.complete_and_claim(?::bigint[], ?::bigint[], ?::jsonb[], ?, ?::text[], ?::text[], \
@@ -127,8 +127,8 @@ called connection = \case
     , isAgain it
     )
   start (task, lease, robot, key, input, count) = Start (TaskNumber task) (Number lease) robot key input count
-  either' (task, lease, robot, key, input, count) = case (robot, key, input, count) of
-    (Just robot', Just key', Just input', Just count') -> Right (start (task, lease, robot', key', input', count'))
+  isHere (task, lease, theRobot, theKey, theInput, theCount) = case (theRobot, theKey, theInput, theCount) of
+    (Just robot, Just key, Just input, Just count) -> Right (start (task, lease, robot, key, input, count))
     _ -> Left (TaskNumber task, Number lease)
   renewed (task, lease, isCancelled) = (TaskNumber task, Number lease, isCancelled)
   completed (task, lease) = (TaskNumber task, Number lease)

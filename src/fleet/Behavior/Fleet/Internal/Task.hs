@@ -76,10 +76,10 @@ queue = Queue . Text.pack
 --
 -- @since 0.1.0.0
 data SubmitOptions = SubmitOptions
-  { priority :: Int
+  { taskPriority :: Int
   -- ^ Of tasks that wait the one with the largest is started first; 0 by default.
-  , needs :: [String]
-  -- ^ What a robot must be capable of ('skills') to start it; nothing by default.
+  , taskNeeds :: [String]
+  -- ^ What a robot must be capable of ('robotSkills') to start it; nothing by default.
   , startAfter :: Maybe Seconds
   -- ^ It is not started before that time has passed; at once by default.
   , startWithin :: Maybe Seconds
@@ -87,7 +87,7 @@ data SubmitOptions = SubmitOptions
   , everyPeriod :: Maybe Seconds
   -- ^ When it has ended, it is submitted again for the next of its times, which are so far apart (at least 1 s). The
   -- key is that of all of them; once by default.
-  , pauses :: [Seconds]
+  , taskPauses :: [Seconds]
   -- ^ After each start that has failed: how long until it may be started again. When there is no pause left it is dead.
   -- So there is one start more than pauses. 1 s, 10 s, a minute and ten minutes by default.
   , keepFor :: Seconds
@@ -101,12 +101,12 @@ data SubmitOptions = SubmitOptions
 defaultSubmitOptions :: SubmitOptions
 defaultSubmitOptions =
   SubmitOptions
-    { priority = 0
-    , needs = []
+    { taskPriority = 0
+    , taskNeeds = []
     , startAfter = Nothing
     , startWithin = Nothing
     , everyPeriod = Nothing
-    , pauses = [1, 10, 60, 600]
+    , taskPauses = [1, 10, 60, 600]
     , keepFor = 604800
     }
 
@@ -145,7 +145,8 @@ submit = submitWith defaultSubmitOptions
 -- >>> let patrols = queue "patrols" :: Queue String ()
 -- >>> :{
 -- inFleet $ \fleet -> do
---   _ <- submitWith defaultSubmitOptions {everyPeriod = Just 3600, needs = ["camera"]} fleet patrols "north" "gate 1"
+--   let hourly = defaultSubmitOptions {everyPeriod = Just 3600, taskNeeds = ["camera"]}
+--   _ <- submitWith hourly fleet patrols "north" "gate 1"
 --   _ <- submitWith defaultSubmitOptions {everyPeriod = Just 0.1} fleet patrols "south" "gate 2"
 --   pure ()
 -- :}
@@ -161,12 +162,12 @@ submitWith chosen fleet (Queue name) key input = do
         { toQueue = name
         , withKey = Text.pack key
         , taskInput = value
-        , withPriority = priority chosen
+        , withPriority = taskPriority chosen
         , notBefore = startAfter chosen
         , notAfter = startWithin chosen
-        , withNeeds = Set.fromList (map Text.pack (needs chosen))
+        , withNeeds = Set.fromList (map Text.pack (taskNeeds chosen))
         , withPeriod = everyPeriod chosen
-        , withPauses = pauses chosen
+        , withPauses = taskPauses chosen
         , keptFor = keepFor chosen
         }
   Ticket <$> granted answer
@@ -191,7 +192,7 @@ findTask fleet (Queue name) key = fmap (fmap Ticket) (request fleet working (Fin
 --   ticket <- submit fleet orders "order 1" "a chair"
 --   firstOf
 --     [ absurd <$> serving fleet orders (\_ -> sleep 5 >> pure (pure 0))
---     , watchingTask fleet ticket (Signal.waitUntil . fmap ((== Done) . state)) >> now
+--     , watchingTask fleet ticket (Signal.waitUntil . fmap ((== Done) . taskState)) >> now
 --     ]
 -- :}
 -- 5.0
@@ -214,7 +215,7 @@ watchingTask fleet (Ticket number) use = do
 -- | Waits until the task is done, and gives its result.
 --
 -- [Failure] 'NotDone' when it is dead or cancelled, or is kept no more. 'NoDatabase'.
--- [Fault] 'Undecodable', if its result is not of this type.
+-- [Fault] 'UndecodableResult', if its result is not of this type.
 -- [Cancellation] Ends the wait; the task goes on.
 --
 -- @since 0.1.0.0
@@ -222,13 +223,13 @@ waitForTask :: FromJSON o => Fleet -> Ticket o -> Behavior o
 waitForTask fleet (Ticket number) = withNotices fleet [OfTask number] $ \change ->
   let go = request fleet listening (Look [number]) >>= granted >>= \case
         (_, task) : _
-          | state task == Done -> either (throwIO . Undecodable "the result of the task") pure (resultOf task)
-          | state task `elem` [Dead, Cancelled] -> throwIO (NotDone (Just (state task)) (reasons task))
+          | taskState task == Done -> either (throwIO . UndecodableResult "the result of the task") pure (resultOf task)
+          | taskState task `elem` [Dead, Cancelled] -> throwIO (NotDone (Just (taskState task)) (taskReasons task))
           | otherwise -> change `orAfter` pollEvery (options fleet) >> go
         [] -> throwIO (NotDone Nothing [])
    in go
  where
-  resultOf task = maybe (Left "it has none") decoded (result task)
+  resultOf task = maybe (Left "it has none") decoded (taskResult task)
 
 -- | Cancels a task: one that waits at once; of one that runs the robot is interrupted, and it is cancelled when its
 -- behaviour has stopped (or its lease ends). Of periodic tasks none comes any more.

@@ -62,7 +62,7 @@ opened path = withBinaryFile path ReadMode $ \file -> do
 showRun :: IO () -> LivePage -> FilePath -> Listener -> Begin -> IO (Maybe TraceError)
 showRun pause page path listener begin@(Begin (Header zero) line) = do
   seen <- newTVarIO (Seen 0 False)
-  thisRun <- (\name -> Run (robot page) name zero) <$> newRunName
+  thisRun <- (\name -> Run (pageRobot page) name zero) <$> newRunName
   showing listener (newShown kept thisRun (time seen)) $ \shown ->
     let go isKnown at = look path begin at >>= \case
           NoMore -> pause >> go True at
@@ -73,7 +73,7 @@ showRun pause page path listener begin@(Begin (Header zero) line) = do
             go isKnown after
           Another -> pure Nothing
           Damaged problem -> pure (Just problem)
-    in go False (Position (toInteger (Bytes.length line)) 0 line)
+    in go False (ReadSoFar (toInteger (Bytes.length line)) 0 line)
  where
   -- A page keeps as many.
   kept = defaultLimits {mostEnded = 20000, mostReactions = 2000}
@@ -87,19 +87,19 @@ showRun pause page path listener begin@(Begin (Header zero) line) = do
 data Seen = Seen !Seconds !Bool
 
 -- | How many bytes were read, and events; and the last of the bytes.
-data Position = Position !Integer !Int !Bytes.ByteString
+data ReadSoFar = ReadSoFar !Integer !Int !Bytes.ByteString
 
 data Look
   = -- | There is no further line.
     NoMore
-  | More [Event] Position
+  | More [Event] ReadSoFar
   | -- | The file is that of another run.
     Another
   | Damaged TraceError
 
 -- | Reads the next lines, as far as they are complete. (A file that is not there is being replaced.)
-look :: FilePath -> Begin -> Position -> IO Look
-look path (Begin _ header) (Position from count lastRead) = absent NoMore . withBinaryFile path ReadMode $ \file -> do
+look :: FilePath -> Begin -> ReadSoFar -> IO Look
+look path (Begin _ header) (ReadSoFar from count lastRead) = absent NoMore . withBinaryFile path ReadMode $ \file -> do
   begins <- Bytes.hGet file (Bytes.length header)
   size <- hFileSize file
   hSeek file AbsoluteSeek (from - toInteger (Bytes.length lastRead))
@@ -113,7 +113,7 @@ look path (Begin _ header) (Position from count lastRead) = absent NoMore . with
         Left (DamagedLine n why) -> Damaged (DamagedLine (n + count) why)
         Left problem -> Damaged problem
         Right (_, events, _) ->
-          More events (Position (from + toInteger (Bytes.length complete)) (count + length events) (lastOf complete))
+          More events (ReadSoFar (from + toInteger (Bytes.length complete)) (count + length events) (lastOf complete))
   lastOf bytes = Bytes.copy (Bytes.drop (Bytes.length bytes - 4096) bytes)
   linesFrom file most = do
     hSeek file AbsoluteSeek from

@@ -51,7 +51,7 @@ import Behavior.Live.Internal.Shown
 --
 -- @since 0.1.0.0
 data LivePage = LivePage
-  { robot :: String
+  { pageRobot :: String
   -- ^ The robot's name, for the page's title.
   , pageHost :: String
   -- ^ The address at which it is served.
@@ -66,7 +66,7 @@ data LivePage = LivePage
 --
 -- @since 0.1.0.0
 loopback :: LivePage
-loopback = LivePage {robot = "robot", pageHost = "127.0.0.1", pagePort = 8420, pageToken = Nothing}
+loopback = LivePage {pageRobot = "robot", pageHost = "127.0.0.1", pagePort = 8420, pageToken = Nothing}
 
 -- | Prints a line about the page on @stderr@. (Where it cannot be printed, all goes on nevertheless.)
 report :: String -> IO ()

@@ -6,7 +6,7 @@
 -- Internal: any of it may change in any release.
 module Behavior.Ros.Internal.Keeper
   ( withRos
-  , withRosWith
+  , withRosOptions
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
@@ -43,7 +43,7 @@ import Behavior.Trace (Change (..), named)
 
 -- | Runs a behaviour with a link to a robot.
 --
--- > withRos = withRosWith defaultRosOptions
+-- > withRos = withRosOptions defaultRosOptions
 --
 -- It does not wait for a robot that is not there: what is used first waits. When the link is lost, each goal that is
 -- awaited and each signal that is watched faults at once with 'Behavior.Ros.LinkLost'; meanwhile it connects again,
@@ -65,15 +65,15 @@ import Behavior.Trace (Change (..), named)
 --
 -- @since 0.1.0.0
 withRos :: Transport -> (Ros -> Behavior a) -> Behavior a
-withRos = withRosWith defaultRosOptions
+withRos = withRosOptions defaultRosOptions
 
 -- | 'withRos' with other options. A duration in them that is negative or NaN is refused with an 'ErrorCall' (a
 -- fault), and so is an address that is not allowed ('Behavior.Ros.rosbridge').
 --
 -- @since 0.1.0.0
-withRosWith :: RosOptions -> Transport -> (Ros -> Behavior a) -> Behavior a
-withRosWith options transport behavior = do
-  for_ durations (duration "withRosWith" . ($ options))
+withRosOptions :: RosOptions -> Transport -> (Ros -> Behavior a) -> Behavior a
+withRosOptions options transport behavior = do
+  for_ durations (duration "withRosOptions" . ($ options))
   traverse_ (throwIO . ErrorCall) (refusal transport)
   ending <- newSuffix transport
   ros <- newRos (address transport) ending options

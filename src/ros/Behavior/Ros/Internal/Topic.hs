@@ -241,7 +241,7 @@ watchSilence ros name silence known judged = do
               arrival <- newer n >>= maybe retry pure
               arrival <$ writeTVar judged (From (arrivalNumber arrival))
             goOn arrival
-  next n otherwise' = atomically (newer n) >>= maybe otherwise' goOn
+  next n instead = atomically (newer n) >>= maybe instead goOn
   goOn arrival = follow (arrivedAt arrival) (arrivalNumber arrival)
   newer n = (\found -> if (arrivalNumber <$> found) > Just n then found else Nothing) <$> readTVar (newest known)
   -- The bridge may have lost the subscription. (But if a message has come over this connection, it has not: and a

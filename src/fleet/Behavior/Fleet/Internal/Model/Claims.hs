@@ -44,9 +44,9 @@ startsOf at number = do
   these <- getting (sortOn (lease . snd) . filter (isIts . snd) . Map.toList . rows)
   forM these $ \(n, row) -> do
     put n row {wakes = Just (at + term row)}
-    pure (Start n (fromMaybe 0 (lease row)) (robot row) (key row) (taskInput (submitted row)) (starts (task row)))
+    pure (Start n (fromMaybe 0 (lease row)) (robot row) (key row) (taskInput (submitted row)) (taskStarts (task row)))
  where
-  isIts row = state (task row) == Running && request row == Just number && maybe False (> at) (wakes row)
+  isIts row = taskState (task row) == Running && request row == Just number && maybe False (> at) (wakes row)
 
 -- | The same, of those that wait already. (One whose deadline has passed dies, if it is in the way.)
 claimWaiting :: Seconds -> Claiming -> Doing [Start]
@@ -60,15 +60,16 @@ claimWaiting at it = go (forRobots it)
         | maybe False (<= at) (deadline row) -> wake at n row >> go (name : others)
         | otherwise -> do
             number <- nextNumberOf
-            let started = (task row) {state = Running, starts = starts (task row) + 1, progress = Nothing}
+            let before = task row
+                started = before {taskState = Running, taskStarts = taskStarts before + 1, taskProgress = Nothing}
             put n row
               { task = started, lease = Just number, robot = name, term = forTerm it, request = Just (claimNumber it)
               , wakes = Just (at + forTerm it)
               }
             tellTask n row
-            (Start n number name (key row) (taskInput (submitted row)) (starts started) :) <$> go others
+            (Start n number name (key row) (taskInput (submitted row)) (taskStarts started) :) <$> go others
   order (n, row) = (Down (withPriority (submitted row)), n)
   fits row =
-    state (task row) == Waiting
+    taskState (task row) == Waiting
       && toQueue (submitted row) == fromQueue it
       && withNeeds (submitted row) `Set.isSubsetOf` withSkills it

@@ -60,13 +60,13 @@ hold at it = do
       [] -> do
         passOver passedOver
         change (\m -> m {places = Map.delete mine (places m)})
-        Holds <$> forM (Set.toList names) take'
+        Holds <$> forM (Set.toList names) taken
 
   -- (Once is enough, until it asks again.)
   passOver these = forM_ these $ \(n, _) ->
     change (\m -> m {places = Map.adjust (\other -> other {placeUntil = at}) n (places m)})
 
-  take' name = do
+  taken name = do
     n <- nextNumberOf
     let holder = Holder n (Just (wishNumber it)) (wishRobot it) (wishTerm it) (at + wishTerm it)
     (name, n) <$ change (\m -> m {resources = Map.insert name holder (resources m)})
@@ -99,7 +99,7 @@ placeOf at it = do
   before <- getting (Map.keys . Map.filter ((== wishNumber it) . wishNumber . wish) . places)
   next <- getting nextPlace
   let n = fromMaybe next (listToMaybe before)
-  change (\m -> m {places = Map.insert n (Place it at (at + 10)) (places m)})
+  change (\m -> m {places = Map.insert n (Waiter it at (at + 10)) (places m)})
   n <$ change (\m -> m {nextPlace = max (nextPlace m) (n + 1)})
 
 resourcesOf :: Set Text -> Model -> Map Text Holder
@@ -134,7 +134,7 @@ release at number = do
     | otherwise = maybe [OfResource name] (\next -> [OfTurn next, OfLine name]) (listToMaybe (canHave name m))
   canHave name m =
     [ wishNumber it
-    | Place it _ end <- Map.elems (places m)
+    | Waiter it _ end <- Map.elems (places m)
     , Set.member name (wishFor it) && end > at && freeFrom (wishFor it) m <= at
     ]
   isIts = (== number) . wishNumber

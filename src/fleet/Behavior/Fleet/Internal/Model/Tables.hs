@@ -10,7 +10,7 @@ module Behavior.Fleet.Internal.Model.Tables
     Model (..)
   , Row (..)
   , Holder (..)
-  , Place (..)
+  , Waiter (..)
   , emptyModel
   , perEpoch
   , isOpen
@@ -50,7 +50,7 @@ data Model = Model
   , nextRow :: TaskNumber
   , nextNumber :: Number
   , resources :: Map Text Holder
-  , places :: Map Int Place
+  , places :: Map Int Waiter
   , nextPlace :: Int
   , epoch :: Int
   , isRestored :: Bool
@@ -87,8 +87,8 @@ data Holder = Holder
   , heldUntil :: Seconds
   }
 
--- | Of one that waits for resources.
-data Place = Place
+-- | One that waits for resources.
+data Waiter = Waiter
   { wish :: Wish
   , asked :: Seconds
   , placeUntil :: Seconds
@@ -117,7 +117,7 @@ perEpoch = 1000000
 
 -- | Whether a task is to come, waits or runs.
 isOpen :: Row -> Bool
-isOpen row = state (task row) `elem` [Later, Waiting, Running]
+isOpen row = taskState (task row) `elem` [Later, Waiting, Running]
 
 -- | Whether a task is one of a series.
 isPeriodic :: Row -> Bool

@@ -47,7 +47,7 @@ find name its full = getting (listToMaybe . sortOn order . filter (matches . snd
  where
   order (n, row) = (not (isOpen row), key row /= full, Down n)
   matches row = toQueue (submitted row) == name && if isPeriodic row then ofSeries row else key row == its
-  ofSeries row = withKey (submitted row) == its && (key row == full || isOpen row || state (task row) == Cancelled)
+  ofSeries row = withKey (submitted row) == its && (key row == full || isOpen row || taskState (task row) == Cancelled)
 
 -- | A task: the same key again is the same task.
 submit :: Seconds -> Submission -> Doing TaskNumber
@@ -113,7 +113,7 @@ complete at n l gave = startOf n l >>= maybe (pure []) (\row -> [(n, l)] <$ clos
 
 -- | The task, if that lease is the one of its start that runs.
 startOf :: TaskNumber -> Number -> Doing (Maybe Row)
-startOf n l = getting (mfilter (\row -> lease row == Just l && state (task row) == Running) . Map.lookup n . rows)
+startOf n l = getting (mfilter (\row -> lease row == Just l && taskState (task row) == Running) . Map.lookup n . rows)
 
 -- | The same, or it refuses.
 running :: TaskNumber -> Number -> Doing Row
@@ -121,9 +121,9 @@ running n l = requireEpoch >> startOf n l >>= maybe (throwE LeaseGone) pure
 
 -- | What became of this start.
 became :: TaskNumber -> Number -> Doing Became
-became n l = getting (maybe IsLost (of' . state . task) . mfilter ((== Just l) . lease) . Map.lookup n . rows)
+became n l = getting (maybe IsLost (inState . taskState . task) . mfilter ((== Just l) . lease) . Map.lookup n . rows)
  where
-  of' = \case Running -> StillRuns; Done -> IsCompleted; _ -> IsLost
+  inState = \case Running -> StillRuns; Done -> IsCompleted; _ -> IsLost
 
 -- | A start has ended without a completion; whether it counts.
 startEnded :: Seconds -> TaskNumber -> Row -> Text -> Bool -> Doing ()
@@ -135,21 +135,21 @@ startEnded at n row why counts
       tell (if isLater then OfLater else OfQueue (toQueue (submitted row)))
       tellTask n row
  where
-  soFar = starts (task row) - (if counts then 0 else 1)
+  soFar = taskStarts (task row) - (if counts then 0 else 1)
   again = if counts then at + (withPauses (submitted row) !! (soFar - 1)) else at
   isLater = again > at
   ended =
     (task row)
-      { state = if isLater then Later else Waiting
-      , starts = soFar
-      , reasons = reasons (task row) ++ [Text.unpack (Text.take 1000 why) | counts]
+      { taskState = if isLater then Later else Waiting
+      , taskStarts = soFar
+      , taskReasons = taskReasons (task row) ++ [Text.unpack (Text.take 1000 why) | counts]
       }
 
 -- | A task has ended. One that is periodic is followed by the next one.
 close :: Seconds -> TaskNumber -> Row -> TaskState -> Maybe Value -> Maybe Text -> Doing ()
 close at n row how gave why = do
   put n row
-    { task = (task row) {state = how, result = gave, reasons = reasons (task row) ++ map Text.unpack (toList why)}
+    { task = before {taskState = how, taskResult = gave, taskReasons = reasons}
     , wakes = if how == Dead then Nothing else Just (at + keptFor (submitted row))
     }
   tellTask n row
@@ -161,15 +161,17 @@ close at n row how gave why = do
         after = (\end -> next + (end - due row) - at) <$> deadline row
     void (submit at (submitted row) {notBefore = Just (next - at), notAfter = after})
  where
+  before = task row
+  reasons = taskReasons before ++ map Text.unpack (toList why)
   isOfQueue other = toQueue (submitted other) == toQueue (submitted row)
 
 -- | The clock has made this task due.
 wake :: Seconds -> TaskNumber -> Row -> Doing ()
-wake at n row = case state (task row) of
+wake at n row = case taskState (task row) of
   Running -> startEnded at n row "its lease has expired" True
   _ | maybe False (<= at) (deadline row) -> close at n row Dead Nothing (Just "its deadline has passed")
     | otherwise -> do
-        put n row {task = (task row) {state = Waiting}, wakes = deadline row}
+        put n row {task = (task row) {taskState = Waiting}, wakes = deadline row}
         tell (OfQueue (toQueue (submitted row)))
 
 -- | Does what the clock has made due; when the next is.
@@ -189,7 +191,7 @@ look numbers = do
   these <- getting ((`Map.restrictKeys` Set.fromList numbers) . rows)
   forM_ (Map.toList (Map.filter (not . isWatched) these)) $ \(n, row) -> do
     put n row {isWatched = True}
-    when (state (task row) == Waiting) $ tell (OfQueue (toQueue (submitted row)))
+    when (taskState (task row) == Waiting) $ tell (OfQueue (toQueue (submitted row)))
   pure (Map.toList (task <$> these))
 
 -- | Cancels a task: the state that it has then.
@@ -198,9 +200,9 @@ cancel at name its =
   find name its its >>= \case
     Nothing -> pure Nothing
     Just (n, row)
-      | state (task row) `elem` [Later, Waiting] -> Just Cancelled <$ close at n row Cancelled Nothing Nothing
-      | state (task row) == Running -> Just Running <$ (put n row {isCancelled = True} >> tell (OfCancel n))
-      | otherwise -> pure (Just (state (task row)))
+      | taskState (task row) `elem` [Later, Waiting] -> Just Cancelled <$ close at n row Cancelled Nothing Nothing
+      | taskState (task row) == Running -> Just Running <$ (put n row {isCancelled = True} >> tell (OfCancel n))
+      | otherwise -> pure (Just (taskState (task row)))
 
 -- | It is not periodic any more: the next one has been submitted already.
 retryDead :: Text -> Text -> Doing Bool
@@ -208,7 +210,7 @@ retryDead name its = do
   these <- getting (filter (isIt . snd) . Map.toList . rows)
   forM_ these $ \(n, row) -> do
     put n row
-      { task = (task row) {state = Waiting, starts = 0}
+      { task = (task row) {taskState = Waiting, taskStarts = 0}
       , wakes = Nothing
       , deadline = Nothing
       , submitted = (submitted row) {withPeriod = Nothing}
@@ -216,11 +218,11 @@ retryDead name its = do
     tell (OfQueue name)
   pure (not (null these))
  where
-  isIt row = toQueue (submitted row) == name && key row == its && state (task row) == Dead
+  isIt row = toQueue (submitted row) == name && key row == its && taskState (task row) == Dead
 
 -- | Those of a queue that are dead.
 listDead :: Text -> Doing [(Text, Task)]
 listDead name = getting (\m -> [(key row, known row) | row <- Map.elems (rows m), isIts row])
  where
-  isIts row = toQueue (submitted row) == name && state (task row) == Dead
-  known row = (task row) {progress = Nothing, result = Nothing}
+  isIts row = toQueue (submitted row) == name && taskState (task row) == Dead
+  known row = (task row) {taskProgress = Nothing, taskResult = Nothing}
