@@ -14,7 +14,7 @@ help:
 	@echo 'make docs      build the documentation, which must cover every export'
 	@echo 'make check     check the package with cabal check'
 	@echo 'make matrix    demo and test in clean Debian systems (SUITES="bookworm" selects one)'
-	@echo 'make ci        all of these'
+	@echo 'make ci        all of these, and make robots, browser and fleets'
 	@echo 'make bench     what it costs, and whether the targets are met (KEEP=1 keeps the ratios;'
 	@echo '               make bench-check compares with those that are kept)'
 	@echo 'make soak      more random schedules and programs (SECONDS=600 for ten minutes)'

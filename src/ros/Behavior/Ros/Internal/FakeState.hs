@@ -20,7 +20,7 @@ module Behavior.Ros.Internal.FakeState
   , note
   ) where
 
-import Control.Concurrent.STM
+import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (filterM, unless, when)
 import Data.Aeson (Value, object, (.=))
 import Data.ByteString.Lazy (ByteString)

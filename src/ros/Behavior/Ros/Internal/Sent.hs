@@ -13,7 +13,7 @@ module Behavior.Ros.Internal.Sent
   , setOnce
   ) where
 
-import Control.Concurrent.STM
+import Control.Concurrent.STM hiding (atomically)
 import Control.Monad (when)
 import Data.Aeson (Value)
 import Data.Maybe (isNothing)
