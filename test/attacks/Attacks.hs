@@ -22,6 +22,7 @@ import qualified SimBusy
 import qualified SimEnds
 import qualified SimGhc
 import qualified SimReality
+import qualified SimStopped
 import qualified SinkStorms
 import qualified Sinks
 import qualified SlowStops
@@ -61,6 +62,7 @@ attacks =
   , ("SharedFilters", SharedFilters.attack)
   , ("SimGhc", SimGhc.attack)
   , ("SimReality", SimReality.attack)
+  , ("SimStopped", SimStopped.attack)
   , ("StuckMasked", StuckMasked.attack)
   , ("Sinks", Sinks.attack)
   , ("SinkStorms", SinkStorms.attack)

@@ -40,7 +40,8 @@ data SimOptions = SimOptions
   -- ^ After this number of scheduling points during which the virtual time does not advance, the
   -- run is ended ('Livelock'); 100,000 by default.
   , realTimeLimit :: Seconds
-  -- ^ After this amount of real time the run is ended ('TooSlow'); 9 s by default.
+  -- ^ After this amount of real time the run is ended ('TooSlow'); 9 s by default. A time in which the process does
+  -- not run (it is stopped, or other programs have the processors) does not count.
   , timerSlip :: Seconds
   -- ^ A sleeper may be late by less than this. Whenever the virtual time advances, the schedule chooses among
   -- the moments at which a sleeper is due: the first one, and those that are less than this after it.

@@ -17,6 +17,7 @@ import Data.Map.Strict (Map)
 import qualified Data.Map.Strict as Map
 import GHC.Clock (getMonotonicTime)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus)
+import System.CPUTime (getCPUTime)
 import System.IO (hFlush, hPutStrLn, stderr)
 import System.IO.Unsafe (unsafePerformIO)
 
@@ -41,7 +42,7 @@ watched n sim = bracket_ enter (change (\(sims, awake) -> ((Map.delete n sims, a
     unless awake $ do
       (here, _) <- threadCapability =<< myThreadId
       -- On another capability, if there is one: a task may keep this one busy.
-      void (mask_ (forkOn (here + 1) (watchLoop Map.empty 0)))
+      void (mask_ (forkOn (here + 1) (onward (Clock 0 0 0) >>= watchLoop Map.empty 0)))
 
 change :: ((Map Int Sim, Bool) -> ((Map Int Sim, Bool), b)) -> IO b
 -- (The map is forced: a thunk would keep simulations that have ended alive.)
@@ -53,32 +54,44 @@ data Sample = Sample
   , waits :: !Int
   -- ^ At how many checks it was at this point, and its thread waited outside of the simulation.
   , since :: !Double
-  -- ^ The real time of the first check.
+  -- ^ The time of the first check.
   , reported :: !Bool
   -- ^ Whether the watchdog has ended the run.
   , warned :: !Bool
   -- ^ Whether the warning that the thread cannot be stopped was printed.
   }
 
+-- | The real time, the processor time of the process, and the real time that counts.
+data Clock = Clock !Double !Double !Double
+
+-- | A time in which the process did not run does not count: it was stopped (by Ctrl-Z), the machine was suspended, or
+-- other programs had the processors. (It runs at each check, or else computes.)
+onward :: Clock -> IO Clock
+onward (Clock before usedBefore counted) = do
+  t <- getMonotonicTime
+  used <- (/ 1e12) . fromIntegral <$> getCPUTime
+  pure (Clock t used (counted + min (t - before) (max 0.25 (used - usedBefore))))
+
 -- | Checks every few milliseconds, as long as there are simulations.
-watchLoop :: Map Int Sample -> Int -> IO ()
-watchLoop seen idle = do
+watchLoop :: Map Int Sample -> Int -> Clock -> IO ()
+watchLoop seen idle before = do
   osSleep 5000
+  clock@(Clock _ _ t) <- onward before
   (sims, _) <- readIORef watchedSims
   if Map.null sims && idle > 20
     then do
       go <- change (\(left, _) -> if Map.null left then ((left, False), False) else ((left, True), True))
-      when go (watchLoop seen 0)
+      when go (watchLoop seen 0 clock)
     else do
-      samples <- Map.traverseWithKey (\n sim -> check sim (Map.lookup n seen)) sims
-      watchLoop samples $! if Map.null sims then idle + 1 else 0 -- a thunk would keep the samples
+      samples <- Map.traverseWithKey (\n sim -> check t sim (Map.lookup n seen)) sims
+      let later = if Map.null sims then idle + 1 else 0
+      later `seq` watchLoop samples later clock -- a thunk would keep the samples
 
-check :: Sim -> Maybe Sample -> IO Sample
-check sim before = do
+check :: Double -> Sim -> Maybe Sample -> IO Sample
+check t sim before = do
   n <- readIORef (counter sim)
   runner <- readIORef (current sim)
   status <- maybe (pure ThreadFinished) threadStatus (taskThread runner)
-  t <- getMonotonicTime
   case before of
     Nothing -> pure (Sample n 0 t False False)
     Just sample
