@@ -5,7 +5,7 @@
 module Trace.TraceSpec (spec) where
 
 import Control.Concurrent (forkIO, myThreadId, yield)
-import Control.Concurrent.Async (wait, withAsync)
+import Control.Concurrent.Async (asyncThreadId, wait, withAsync)
 import Control.Concurrent.STM (newTVarIO, readTVar, readTVarIO, retry, writeTVar)
 import Control.Exception
 import Control.Monad (void)
@@ -14,12 +14,13 @@ import Data.IORef (modifyIORef', newIORef, readIORef, writeIORef)
 import Data.List (isPrefixOf)
 import Data.Maybe (fromMaybe, listToMaybe)
 import GHC.Conc (ThreadStatus (..), threadStatus)
+import System.IO.Unsafe (unsafePerformIO)
 import Test.Hspec
 
 import Behavior
 import Behavior.Internal.Seam.Runtime (liveThreadCount)
 import Behavior.Internal.Spans.Place (Place (trace), Receiver (..), Trace (traceClock), inPlace, myPlace, withReceiver)
-import Behavior.Internal.Spans.Span (abandonableIn)
+import Behavior.Internal.Spans.Span (abandonableIn, endOf)
 import Behavior.Parallel (allOf, await, decide, firstOf, fork, requestStop, scoped, tryAwait)
 import Behavior.STM (atomically)
 import qualified Behavior.Signal as Signal
@@ -329,6 +330,16 @@ reactions = do
       `shouldThrow` (== Cancel "caller")
     found <- readIORef seen
     [reactionOperator r | Reacted r <- found] `shouldBe` ["insteadWhen"]
+
+  it "loses no cancellation of the operator that comes while it looks how the branch has ended" $ do
+    looking <- newGate
+    goingOn <- newGate
+    let thrown = unsafePerformIO (toException (userError "jammed") <$ (open looking >> pass goingOn))
+    withThread (endOf (Left thrown :: Either SomeException ())) $ \operator -> do
+      pass looking
+      throwing (asyncThreadId operator) (Cancel "caller")
+      open goingOn
+      awaitEnd operator `shouldReturn` Support.CancelledBy (show (Cancel "caller"))
 
   it "is not reported when an operator only begins" $ do
     (_, seen) <-

@@ -30,6 +30,7 @@ import qualified StopsOnce
 import qualified Storm
 import qualified StuckLimits
 import qualified StuckMasked
+import qualified TracedStops
 import qualified Traces
 import qualified Truth
 import qualified UndefinedOutside
@@ -70,6 +71,7 @@ attacks =
   , ("StopsOnce", StopsOnce.attack)
   , ("Storm", Storm.attack)
   , ("StuckLimits", StuckLimits.attack)
+  , ("TracedStops", TracedStops.attack)
   , ("Traces", Traces.attack)
   , ("Truth", Truth.attack)
   , ("UndefinedOutside", UndefinedOutside.attack)

@@ -141,9 +141,12 @@ spanning kind name place act = do
  where
   inTurn report = if null (abandonable place) then report else oneAtATime (trace place) report
 
--- | How a behaviour ended that returned or threw.
+-- | How a behaviour ended that returned or threw. (What is thrown at the caller meanwhile stays pending: it must not be
+-- taken for what the exception throws when it is evaluated.)
 endOf :: Either SomeException a -> IO End
-endOf = either (\e -> try (evaluate (kind e)) >>= either undefinedException pure) (\_ -> pure Succeeded)
+endOf = \case
+  Right _ -> pure Succeeded
+  Left e -> uninterruptibleMask_ (try (evaluate (kind e))) >>= either undefinedException pure
  where
   kind e
     | Just (BehaviorFailed _ failure) <- fromException e = FailedWith (displayException failure)

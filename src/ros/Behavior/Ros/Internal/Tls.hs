@@ -8,13 +8,15 @@ module Behavior.Ros.Internal.Tls
   ( withTls
   ) where
 
-import Control.Exception (SomeException, catch, throwIO, toException, try)
+import Control.Exception (catch, throwIO, toException)
 import Control.Monad (void)
 import qualified Data.ByteString as Strict
 import qualified Data.ByteString.Lazy as Lazy
 import Network.Socket (Socket)
 import OpenSSL (withOpenSSL)
 import qualified OpenSSL.Session as Tls
+
+import Behavior (tryAny)
 
 -- | Encrypts the connection to the host, and runs the action with what receives from it and sends to it, if the host
 -- has proved its name: by a certificate in the file, or by one that the system trusts.
@@ -37,7 +39,7 @@ withTls trusted host use socket = withOpenSSL $ do
     isProved <- Tls.getVerifyResult connection
     throwIO (if isProved then toException (e :: Tls.SomeSSLException) else toException notProved)
   notProved = userError ("no certificate that is trusted proves that it is " ++ host)
-  goodbye connection = void (try (Tls.shutdown connection Tls.Unidirectional) :: IO (Either SomeException ()))
+  goodbye connection = void (tryAny (Tls.shutdown connection Tls.Unidirectional))
 
 -- | What checks certificates.
 checking :: Maybe FilePath -> IO Tls.SSLContext
