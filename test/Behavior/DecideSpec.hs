@@ -141,6 +141,12 @@ unchosen = do
         ending (decide choose [other, pass entered]) `shouldReturn` (expected :: Ending ())
         notes entries `shouldReturn` ["cleaned up"]
 
+  it "by the fault of a cleanup, though the function has thrown" $ do
+    entered <- newGate
+    let other = (open entered >> hang) `onException` throwIO (Fault "cleanup")
+        choose ends = if null (catMaybes ends) then Nothing else throw (Fault "function")
+    ending (decide choose [other, pass entered]) `shouldReturn` (FaultedWith (show (Fault "cleanup")) :: Ending ())
+
   it "by what the function throws before the start: nothing starts" $ do
     entries <- newLog
     ending (decide (throw (Fault "function")) [note entries "started"])

@@ -31,6 +31,7 @@ spec = guarded $ do
   describe "A synchronous exception that is thrown to the caller from outside" thrownToTheCaller
   describe "Users' code in the operator's thread" usersCode
   describe "An exception that is itself undefined" undefinedExceptions
+  describe "What is thrown while an exception is evaluated" duringEvaluation
 
 -- | Each operator, with a branch that runs until it is stopped.
 operators :: [(String, Behavior String -> Behavior String)]
@@ -162,6 +163,30 @@ instance Eq Key where
   Key a == Key b
     | a == b = True
     | otherwise = throw (Fault "equality")
+
+duringEvaluation :: Spec
+duringEvaluation = do
+  it "at the caller, by another thread: is received after it" $
+    evaluating $ \slow looking goesOn ->
+      withThread ((try (parallel hang hang) :: IO (Either SomeException ())) >> hang) $ \caller -> do
+        throwing (asyncThreadId caller) slow
+        pass looking
+        throwing (asyncThreadId caller) (Cancel "caller")
+        goesOn
+        awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "caller")) :: Ending ())
+  it "at the branch, which is stopped: does not replace what the branch has thrown" $
+    evaluating $ \slow looking goesOn ->
+      withThread (parallel (throwIO slow) (pass looking)) $ \caller -> do
+        awaitThrown (asyncThreadId caller)
+        goesOn
+        awaitEnd caller `shouldReturn` FaultedWith (show (Fault "slow"))
+ where
+  -- With an exception whose evaluation opens the gate, and then waits.
+  evaluating act = do
+    looking <- newGate
+    goesOn <- newGate
+    let slow = unsafePerformIO (toException (Fault "slow") <$ (open looking >> pass goesOn))
+    act slow looking (open goesOn)
 
 undefinedExceptions :: Spec
 undefinedExceptions = do

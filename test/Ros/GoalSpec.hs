@@ -101,6 +101,12 @@ spec = guarded $ do
   describe "A goal whose stop is not confirmed" $ do
     it "is a fault when the patience has ended" . underSchedules 150 . mission (const stubborn) $ \_ ros ->
       inSeconds 12 (tried (stopAfter 10 (carrying ros "cup"))) >>= (`shouldBe` Left (NotConfirmed "/carry" cancelling))
+    it "is not caught by what handles faults: the stop goes on" . underSchedules 150 . mission (const stubborn) $
+      \_ ros -> do
+        goesOn <- newIORef False
+        end <- tried (stopAfter 10 (carrying ros "cup" `catchAny` \_ -> "" <$ writeIORef goesOn True))
+        end `shouldBe` Left (NotConfirmed "/carry" cancelling)
+        readIORef goesOn >>= (`shouldBe` False)
     it "is one that names a bridge that works on requests only when no goal runs" . underSchedules 40 $
       mission (const slowly) $ \robot ros -> do
         workSerially robot

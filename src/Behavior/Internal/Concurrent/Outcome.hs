@@ -21,12 +21,10 @@ import Control.Exception
   ( Exception (..)
   , SomeAsyncException (..)
   , SomeException (..)
-  , evaluate
   , throwIO
-  , try
   )
 
-import Behavior.Internal.Core.Failure (BehaviorFailed (..), StoppedWithFault (..), isFailure)
+import Behavior.Internal.Core.Failure (BehaviorFailed (..), StoppedWithFault (..), isFailure, tryEvaluate)
 import Behavior.Internal.Core.Stop (isStopOf)
 
 -- | How a branch ended.
@@ -59,7 +57,7 @@ classify = \case
   Right a -> pure (Completed a)
   Left e -> do
     self <- myThreadId
-    try (evaluate (kind self e)) >>= either (fmap FaultedWith . defined) pure
+    tryEvaluate (kind self e) >>= either (fmap FaultedWith . defined) pure
  where
   kind self e
     | isStopOf self e = Stopped e
@@ -71,7 +69,7 @@ classify = \case
 
 -- | The exception; or if it is itself undefined, what it throws.
 defined :: SomeException -> IO SomeException
-defined e = try (evaluate (forced e)) >>= either defined pure
+defined e = tryEvaluate (forced e) >>= either defined pure
 
 -- | The exception; evaluating it also evaluates everything that handlers match on.
 forced :: SomeException -> SomeException

@@ -37,6 +37,7 @@ module Behavior.Internal.Core.Failure
   , isFailure
   , isCancellation
   , trySynchronous
+  , tryEvaluate
 
     -- * What to do when something fails
   , fallback
@@ -60,8 +61,10 @@ import Control.Exception
   , asyncExceptionFromException
   , asyncExceptionToException
   , catch
+  , evaluate
   , throwIO
   , try
+  , uninterruptibleMask_
   )
 import Control.Monad.Catch (MonadThrow (throwM))
 import Data.Foldable (toList)
@@ -211,6 +214,11 @@ isCancellation e = isJust (fromException e :: Maybe SomeAsyncException)
 -- | 'try' that lets cancellations through.
 trySynchronous :: IO a -> IO (Either SomeException a)
 trySynchronous act = (Right <$> act) `catchSynchronous` (pure . Left)
+
+-- | Evaluates an exception, or what is made of it; gives what that throws. It is not interrupted: what is thrown at
+-- the caller meanwhile stays pending, and is not taken for what the evaluation throws.
+tryEvaluate :: a -> IO (Either SomeException a)
+tryEvaluate a = uninterruptibleMask_ (try (evaluate a))
 
 -- | Handles whatever the action throws, except a cancellation.
 catchSynchronous :: IO a -> (SomeException -> IO a) -> IO a

@@ -6,7 +6,14 @@
 -- Internal: any of it may change in any release.
 module Behavior.Internal.Mock.Driver (driver) where
 
-import Control.Exception (Exception (..), mask_, throwIO, uninterruptibleMask_)
+import Control.Exception
+  ( Exception (..)
+  , asyncExceptionFromException
+  , asyncExceptionToException
+  , mask_
+  , throwIO
+  , uninterruptibleMask_
+  )
 import Data.Foldable (for_)
 
 import Behavior.Internal.Mock.Subject (SubjectKind (ADriver))
@@ -65,4 +72,7 @@ driver mock name messages = do
 data Unsubscribed = Unsubscribed
   deriving (Show)
 
-instance Exception Unsubscribed
+-- (Asynchronous, so that a callback's handler for other exceptions does not catch it.)
+instance Exception Unsubscribed where
+  toException = asyncExceptionToException
+  fromException = asyncExceptionFromException

@@ -33,8 +33,9 @@ import Behavior.Internal.Seam.Runtime (atomically)
 --   second SIGINT or SIGTERM, two seconds later, ends the process, and prints what the cause may be.
 --
 -- Result, failure and fault are the behaviour's; a fault of its cleanup is thrown
--- instead of the exit. A signal that comes too late to cancel the behaviour has the effect that it
--- had before the run: the handler that was installed then is called, and awaited for at most a second, before
+-- instead of the exit, and so is what is thrown at the caller during the cleanup (by a time limit around this, say):
+-- then the program decides whether it goes on. A signal that comes too late to cancel the behaviour has the effect
+-- that it had before the run: the handler that was installed then is called, and awaited for at most a second, before
 -- this returns. So the first signal always has an effect. But only a handler of the kind
 -- 'System.Posix.Signals.Catch' is awaited. Any other (@CatchOnce@, @CatchInfo@, @CatchInfoOnce@, and GHC's own for
 -- SIGINT) is called some time later, or not at all if the program has ended by then. (After the

@@ -178,14 +178,14 @@ starts observer name act = startsObserved observer name act
 
 startsObserved :: Observer -> String -> IO a -> IO a
 startsObserved Silent _ act = act
-startsObserved observer@(Observer here _ cell) name act = do
+startsObserved observer@(Observer here _ cell) name act = mask_ $ do
   report observer (Just name)
   t <- traceClock (trace here)
   seen <- readIORef cell
   writeIORef cell seen {running = Just (name, t)}
   case reaction seen of
     Nothing -> act
-    Just reacted -> mask_ (inPlace (Just here {around = InBranchOf (reactionNumber reacted) : around here}) act)
+    Just reacted -> inPlace (Just here {around = InBranchOf (reactionNumber reacted) : around here}) act
 {-# NOINLINE startsObserved #-}
 
 -- | The operator waits for another value.

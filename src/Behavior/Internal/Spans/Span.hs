@@ -23,7 +23,6 @@ import Control.Concurrent.MVar (withMVar)
 import Control.Exception
   ( Exception (..)
   , SomeException
-  , evaluate
   , mask
   , throwIO
   , try
@@ -38,7 +37,13 @@ import Data.Traversable (for)
 
 import Behavior.Internal.Core.Backend (Label, Simulator (pause, recordNote))
 import Behavior.Internal.Core.Dispatch (inSimulation)
-import Behavior.Internal.Core.Failure (Behavior, BehaviorFailed (..), StoppedWithFault (..), isCancellation)
+import Behavior.Internal.Core.Failure
+  ( Behavior
+  , BehaviorFailed (..)
+  , StoppedWithFault (..)
+  , isCancellation
+  , tryEvaluate
+  )
 import Behavior.Internal.Core.Stop (atPath, causeOf, displayed)
 import Behavior.Internal.Spans.Event
 import Behavior.Internal.Spans.Place
@@ -141,12 +146,11 @@ spanning kind name place act = do
  where
   inTurn report = if null (abandonable place) then report else oneAtATime (trace place) report
 
--- | How a behaviour ended that returned or threw. (What is thrown at the caller meanwhile stays pending: it must not be
--- taken for what the exception throws when it is evaluated.)
+-- | How a behaviour ended that returned or threw.
 endOf :: Either SomeException a -> IO End
 endOf = \case
   Right _ -> pure Succeeded
-  Left e -> uninterruptibleMask_ (try (evaluate (kind e))) >>= either undefinedException pure
+  Left e -> tryEvaluate (kind e) >>= either undefinedException pure
  where
   kind e
     | Just (BehaviorFailed _ failure) <- fromException e = FailedWith (displayException failure)

@@ -24,7 +24,7 @@ module Behavior.Ros.Internal.Goal
   ) where
 
 import Control.Concurrent.STM hiding (atomically)
-import Control.Exception (SomeException, mask, throwIO, try)
+import Control.Exception (catch, mask, throwIO, try)
 import Control.Monad (unless, void, when)
 import Data.Aeson (Value (Null, String))
 import qualified Data.Map.Strict as Map
@@ -32,7 +32,7 @@ import Data.Proxy (Proxy (..))
 import Data.Text (Text)
 import qualified Data.Text as Text
 
-import Behavior (Behavior, (?))
+import Behavior (Behavior, StoppedWithFault (..), (?))
 import Behavior.Internal.Spans.Observer (noticed)
 import Behavior.Parallel (firstOf)
 import Behavior.Ros.Internal.Error
@@ -132,8 +132,9 @@ replacing which = which {preempts = True}
 --   So wait for the server before: where there is none, 'Behavior.Ros.Action.stopAll' fails.)
 -- [Fault] 'LinkLost' at once when the link is lost; 'Undecodable' if the result is not what is expected;
 --   'NotConfirmed' if the server has not confirmed the stop within 'Behavior.Ros.patience'.
--- [Cancellation] Returns after the robot has confirmed, or with one of these faults. A goal that succeeds all the same
---   counts as interrupted.
+-- [Cancellation] Returns after the robot has confirmed; or with 'Behavior.StoppedWithFault', if there was 'LinkLost' or
+--   'NotConfirmed'. (The operator that stopped it throws that fault.) A goal that succeeds all the same counts as
+--   interrupted.
 --
 -- With 'NotConfirmed' and 'LinkLost' /the robot may still move/ when the operator goes on: so a
 -- 'Behavior.Signal.monitor' may start its recovery while it does. Such goals are counted ('Behavior.Ros.movingGoals')
@@ -210,8 +211,8 @@ sendGoal ros which wanted latest = named ("goal: " ++ name) $ do
     Unconfirmed -> whyNotConfirmed ros which >>= throwSTM . NotConfirmed name
   -- (Also if it has succeeded: if the stop ended here, what comes after the goal would run.)
   afterStop stop how
-    | mayStillRun how = atomically (conclude how)
-    | otherwise = throwIO (stop :: SomeException)
+    | mayStillRun how = atomically (conclude how) `catch` (throwIO . StoppedWithFault stop)
+    | otherwise = throwIO stop
 
 -- | What is known of a server that does not confirm.
 whyNotConfirmed :: Ros -> Action a -> STM String

@@ -15,7 +15,7 @@ withOutputTo _ act = act
 #else
 import Control.Concurrent (forkIO, rtsSupportsBoundThreads, threadDelay)
 import Control.Concurrent.MVar (MVar, newEmptyMVar, putMVar, takeMVar)
-import Control.Exception (IOException, SomeException, catch, finally, mask, onException, try)
+import Control.Exception (IOException, SomeException, catch, finally, mask, onException, try, uninterruptibleMask_)
 import Control.Monad (filterM, unless, void, when)
 import Data.Foldable (for_)
 import Data.IORef (IORef, atomicModifyIORef', newIORef, readIORef)
@@ -56,7 +56,7 @@ withOutputTo receive act
           steps <- newIORef 0
           ended <- newEmptyMVar
           _ <- forkIO (relay receive steps readEnd `finally` hClose readEnd `finally` putMVar ended ())
-          restore act `finally` (flushed >> back >> await steps ended)
+          restore act `finally` ((flushed `finally` uninterruptibleMask_ back) >> await steps ended)
         Right Nothing -> restore act
         Left e -> let _ = e :: IOException in restore act
   | otherwise = act
