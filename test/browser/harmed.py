@@ -64,6 +64,7 @@ def row_8():
             claim(8, "another port, by a tunnel", browser.state(), "live", browser.state() == "live")
     with Robot("work") as robot, contextlib.ExitStack() as stack:
         count = lambda: len(os.listdir(f"/proc/{robot.process.pid}/fd"))
+        until(robot.recorded, 5, "the mission's beginning") # (Its files are open then.)
         before = count()
         for _ in range(200):
             stack.enter_context(socket.create_connection(("127.0.0.1", robot.port)))
