@@ -14,6 +14,9 @@ module Watched
   , watched
   , watchedVar
 
+    -- * Filters
+  , beginsAfreshAtARecovery
+
     -- * Sensors
   , Sensor
   , newSensor
@@ -56,11 +59,13 @@ import Control.Exception
 import Control.Monad (void)
 import Data.IORef (atomicModifyIORef', newIORef, readIORef)
 import GHC.Conc (BlockReason (..), ThreadStatus (..), threadStatus, unsafeIOToSTM)
+import Test.Hspec (shouldBe, shouldReturn)
 
 import Behavior (Behavior, Seconds, failWith)
 import Behavior.Internal.Seam.Runtime (atomically)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
+import Behavior.Sim (Run (finished), explore, randomly)
 import Support
 
 -- | The state of a condition.
@@ -94,6 +99,18 @@ watched = Signal.watching . readCondition
 -- | The signal of a plain variable.
 watchedVar :: TVar a -> Signal a
 watchedVar = Signal.watching . readTVar
+
+-- | Under any schedule, the first value after a recovery counts at once for an operator that watches through this
+-- filter, and the one before the recovery does not.
+beginsAfreshAtARecovery :: (Signal Bool -> Signal Bool) -> IO ()
+beginsAfreshAtARecovery through =
+  void . explore (randomly 200) $ \simulated -> do
+    entries <- newLog
+    level <- newTVarIO True
+    let recovery = note entries "recovery" >> atomically (writeTVar level False)
+    run <- simulated (Signal.monitor (through (watchedVar level)) recovery (note entries "task"))
+    finished run `shouldBe` 0
+    notes entries `shouldReturn` ["recovery", "task"]
 
 -- | A sensor that counts its readings. Its function gives what each reading does, by
 -- the reading's number from 1.

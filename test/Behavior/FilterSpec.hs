@@ -7,7 +7,7 @@ module Behavior.FilterSpec (spec) where
 import Control.Concurrent (myThreadId)
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (throwIO)
-import Control.Monad (replicateM_, unless, void)
+import Control.Monad (replicateM_, unless)
 import Data.Foldable (for_)
 import Test.Hspec hiding (after, before)
 import Test.Hspec.QuickCheck (prop)
@@ -17,7 +17,7 @@ import Behavior (Seconds, (|||))
 import Behavior.Internal.Seam.Runtime (atomically, now, sleep)
 import Behavior.Signal (Signal)
 import qualified Behavior.Signal as Signal
-import Behavior.Sim (Run (finished, outcome), explain, explore, randomly, simulate)
+import Behavior.Sim (Run (finished, outcome), explain, simulate)
 import Support
 import Watched
 
@@ -187,13 +187,7 @@ debounce = do
       `shouldReturn` "task"
 
   it "accepts at once the first value after a recovery, and not the one before, under any schedule" $
-    void . explore (randomly 200) $ \simulated -> do
-      entries <- newLog
-      level <- newTVarIO True
-      let recovery = note entries "recovery" >> atomically (writeTVar level False)
-      run <- simulated (Signal.monitor (Signal.debounce 1 (watchedVar level)) recovery (note entries "task"))
-      finished run `shouldBe` 0
-      notes entries `shouldReturn` ["recovery", "task"]
+    beginsAfreshAtARecovery (Signal.debounce 1)
 
   it "discards at a recovery a change that had not lasted" $ do
     entries <- newLog

@@ -164,31 +164,6 @@ instance Eq Key where
     | a == b = True
     | otherwise = throw (Fault "equality")
 
-duringEvaluation :: Spec
-duringEvaluation = do
-  it "at the caller, by another thread: is received after it" $
-    evaluating $ \slow looking goesOn ->
-      withThread ((try (parallel hang hang) :: IO (Either SomeException ())) >> hang) $ \caller -> do
-        throwing (asyncThreadId caller) slow
-        pass looking
-        throwing (asyncThreadId caller) (Cancel "caller")
-        goesOn
-        awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "caller")) :: Ending ())
-  it "at the branch, which is stopped: does not replace what the branch has thrown" $
-    evaluating $ \slow looking goesOn ->
-      withThread (parallel (throwIO slow) (pass looking)) $ \caller -> do
-        awaitThrown (asyncThreadId caller)
-        goesOn
-        awaitEnd caller `shouldReturn` FaultedWith (show (Fault "slow"))
- where
-  -- With a fault whose evaluation opens the gate, and then waits. (GHC from 9.10 on evaluates the 'SomeException' as
-  -- it is thrown, but not what is in it.)
-  evaluating act = do
-    looking <- newGate
-    goesOn <- newGate
-    let slow = unsafePerformIO (Fault "slow" <$ (open looking >> pass goesOn))
-    act slow looking (open goesOn)
-
 undefinedExceptions :: Spec
 undefinedExceptions = do
   it "thrown to the caller from outside: is thrown when the branches have ended" $ do
@@ -271,3 +246,28 @@ undefinedExceptions = do
       awaitEnd caller
     end `shouldBe` FaultedWith (show (Fault "undefined"))
     notes entries `shouldReturn` ["cleaned up"]
+
+duringEvaluation :: Spec
+duringEvaluation = do
+  it "at the caller, by another thread: is received after it" $
+    evaluating $ \slow looking goesOn ->
+      withThread ((try (parallel hang hang) :: IO (Either SomeException ())) >> hang) $ \caller -> do
+        throwing (asyncThreadId caller) slow
+        pass looking
+        throwing (asyncThreadId caller) (Cancel "caller")
+        goesOn
+        awaitEnd caller `shouldReturn` (CancelledBy (show (Cancel "caller")) :: Ending ())
+  it "at the branch, which is stopped: does not replace what the branch has thrown" $
+    evaluating $ \slow looking goesOn ->
+      withThread (parallel (throwIO slow) (pass looking)) $ \caller -> do
+        awaitThrown (asyncThreadId caller)
+        goesOn
+        awaitEnd caller `shouldReturn` FaultedWith (show (Fault "slow"))
+ where
+  -- With a fault whose evaluation opens the gate, and then waits. (GHC from 9.10 on evaluates the 'SomeException' as
+  -- it is thrown, but not what is in it.)
+  evaluating act = do
+    looking <- newGate
+    goesOn <- newGate
+    let slow = unsafePerformIO (Fault "slow" <$ (open looking >> pass goesOn))
+    act slow looking (open goesOn)

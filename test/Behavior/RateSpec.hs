@@ -7,7 +7,7 @@ module Behavior.RateSpec (spec) where
 
 import Control.Concurrent.STM hiding (atomically)
 import Control.Exception (onException)
-import Control.Monad (forever, unless, void, when)
+import Control.Monad (forever, unless, when)
 import Data.Foldable (for_)
 import Data.IORef
 import Data.List (groupBy)
@@ -48,13 +48,7 @@ throttle = do
     finished run `shouldBe` 30
 
   it "takes at once the first value after a recovery, and not the one before, under any schedule" $
-    void . explore (randomly 200) $ \simulated -> do
-      entries <- newLog
-      level <- newTVarIO True
-      let recovery = note entries "recovery" >> atomically (writeTVar level False)
-      run <- simulated (Signal.monitor (Signal.throttle 10 (watchedVar level)) recovery (note entries "task"))
-      finished run `shouldBe` 0
-      notes entries `shouldReturn` ["recovery", "task"]
+    beginsAfreshAtARecovery (Signal.throttle 10)
 
   it "of zero seconds follows its signal" $ do
     condition <- newTestCondition True

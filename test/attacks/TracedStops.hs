@@ -1,6 +1,6 @@
 -- |
 -- In a trace, a stop comes in the moment in which an operator that reacts has just stopped its own branch. Expected:
--- it is received, and nothing of what the operator would start next begins.
+-- it is received, and the operator ends.
 module TracedStops (attack) where
 
 import Control.Concurrent
