@@ -41,8 +41,8 @@
 -- 9. /A dead sensor is never \"false\"./ A condition that fails, faults or no longer has a
 --    value ends its operator with a failure or fault, after the branch has stopped.
 -- 10. /Nothing spins./ An operator that waits uses no processor time. Readings of one
---     polled condition by one operator, rereads included, have slots that are one period
---     apart; each slot has at most one reading.
+--     polled condition by one operator, rereads included, have slots that are at least one
+--     period apart; each slot has at most one reading.
 --
 -- == Which outcome, when several things happened
 --

@@ -27,7 +27,7 @@ import Behavior.Internal.Signal.Source
 -- | A sensor that must be polled: @polling seconds act@ reads it by @act@, in its own
 -- thread, one reading at a time.
 --
--- Readings start in slots that are a period apart, counted from start to start; each slot
+-- Readings start in slots that are at least a period apart, counted from start to start; each slot
 -- has at most one. A reading that overruns its slot skips the slots that it missed.
 -- An operator always decides on a reading that began after the operator did. After it has
 -- stopped a branch, it decides on a reading that began after the branch had ended: so it waits for the

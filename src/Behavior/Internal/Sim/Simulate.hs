@@ -56,7 +56,8 @@ import Behavior.Internal.Spans.Place (Receiver (..), Trace, inPlace, newTrace, p
 --
 -- When it returns or throws, all threads of the run have ended, one after the other, the
 -- youngest first. (When the run was ended early, the transactions of a cleanup still run and its
--- sleeps end at once, but a transaction that would have to wait is interrupted instead.)
+-- sleeps end at once, but a transaction that would have to wait is interrupted instead.) A thread that cannot be
+-- unwound is left behind: it waits outside of this library, or goes on after each exception.
 --
 -- >>> run <- simulate (sleep 3600 >> now)
 -- >>> explain (outcome run)
