@@ -165,6 +165,15 @@ spec = guarded $ do
       run <- simulated (scoped body ||| atomically (readTVar faults >>= check))
       endOf (outcome run) `shouldBe` FaultedWith (show (Fault "child"))
 
+  it "runs each child once, whichever behaviours fork at once" $
+    void . explore (randomly 100) $ \simulated -> do
+      run <- simulated . scoped $ \nursery -> do
+        runs <- newTVarIO (0 :: Int)
+        forked <- allOf (replicate 4 (fork nursery (atomically (modifyTVar' runs (+ 1)))))
+        for_ forked (atomically . await)
+        atomically (readTVar runs)
+      endOf (outcome run) `shouldBe` Gave 4
+
   describe "what fork returns" children
  where
   yielding n = replicateM_ (n `mod` 20) yield
