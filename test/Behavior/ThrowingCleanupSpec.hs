@@ -26,6 +26,7 @@ import Support hiding (End (..))
 spec :: Spec
 spec = guarded $ do
   describe "A cleanup that throws to the operator's caller" fromCleanups
+  describe "An operator that waits for a cleanup" twoExceptions
   describe "A branch that is uninterruptible when its stop is requested" uninterruptibleBranch
   describe "Two limits that expire while an operator waits for a cleanup" limits
 
@@ -105,6 +106,28 @@ fromCleanups = do
     mask $ \restore -> do
       atomically (readTVar occupancy >>= writeTVar occupancy . (+ 1))
       restore act `finally` uninterruptibleMask_ (atomically (readTVar occupancy >>= writeTVar occupancy . subtract 1))
+
+-- | They come when the operator itself has requested the stop, and was not interrupted before.
+twoExceptions :: Spec
+twoExceptions =
+  for_ operators $ \(name, operator) ->
+    it (name ++ ": ends after it, though two exceptions are thrown at its caller") $ do
+      entries <- newLog
+      entered <- newGate
+      cleaning <- newGate
+      release <- newGate
+      let branch = uninterruptibly (open entered >> hang) $ do
+            open cleaning
+            pass release
+            note entries "branch is over"
+      withThread (operator branch (pass entered) `onException` note entries "operator is over") $ \caller -> do
+        pass cleaning
+        for_ ["first", "second"] $ \which -> do
+          throwing (asyncThreadId caller) (Cancel which)
+          stillRunning caller
+        open release
+        awaitEnd caller `shouldReturn` CancelledBy (show (Cancel "first"))
+      notes entries `shouldReturn` ["branch is over", "operator is over"]
 
 -- | The operator requests the stop, and is interrupted before the branch has received it.
 uninterruptibleBranch :: Spec
