@@ -24,7 +24,7 @@ spec = guarded $ do
   -- (Such a day takes most of a second without optimization: three schedules an example.)
   seeds <- runIO (sampleSize 6)
   for_ [0 .. seeds - 1] $ \seed -> describe ("under schedules of seed " ++ show seed) $ do
-    let survives = Worst.survivesFrom seed 3 . day
+    let survives = Worst.survivesOf seed 3 . day
     it "delivers each order once, and none from the empty shelf" $ survives calm
     for_ [0.5, 1, 3, 5.3, 11] $ \moment ->
       it ("also when a process is killed after " ++ show moment ++ " s, and once more") $

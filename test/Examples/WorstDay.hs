@@ -3,7 +3,7 @@
 module Examples.WorstDay
   ( Day
   , survives
-  , survivesFrom
+  , survivesOf
   , failsWith
   , inOneRun
   , ended
@@ -24,11 +24,11 @@ type Day = (Behavior () -> IO (Run ())) -> IO ()
 
 -- | The day has a good end under each of the given number of random schedules.
 survives :: Int -> Day -> Expectation
-survives = survivesFrom 0
+survives = survivesOf 0
 
 -- | 'survives' under the random schedules of this seed.
-survivesFrom :: Int -> Int -> Day -> Expectation
-survivesFrom seed n day = void (explore (plan n) {planSearch = Random n seed} day)
+survivesOf :: Int -> Int -> Day -> Expectation
+survivesOf seed n day = void (explore (plan n) {planSearch = Random n seed} day)
 
 -- | Under one of the given number of random schedules the day has a bad end, with this in its text.
 -- (The bad ends are collected here, and not thrown to 'explore': it would shrink the schedule, which

@@ -6,6 +6,7 @@ module Ros.Stage
   ( mission
   , missionWith
   , underSchedules
+  , underSchedulesOf
   , carry
   , carrying
   , slowly
@@ -44,9 +45,13 @@ missionWith options script act =
 -- | The behaviour ends without an exception, within ten minutes, under each of that many random schedules, and under
 -- the one without pre-emptions.
 underSchedules :: Int -> Behavior () -> IO ()
-underSchedules n act = do
+underSchedules = underSchedulesOf 0
+
+-- | 'underSchedules', with the random ones of this seed.
+underSchedulesOf :: Int -> Int -> Behavior () -> IO ()
+underSchedulesOf seed n act = do
   simulateWith options act >>= well
-  void (explore (randomly n) {planOptions = options} (\simulated -> simulated act >>= well))
+  void (explore (randomly n) {planSearch = Random n seed, planOptions = options} (\simulated -> simulated act >>= well))
  where
   options = defaultSimOptions {endAt = 600}
 
