@@ -1,6 +1,6 @@
 -- |
 -- What is the same under each runtime: random programs under explored schedules (everything there runs in
--- simulations), how time and memory grow, and the live page.
+-- simulations), and how time and memory grow.
 module Main (main) where
 
 import Test.Hspec
@@ -24,10 +24,6 @@ import qualified Fleet.ModelSpec
 import qualified Fleet.PromisesSpec
 import qualified Fleet.ResourceSpec
 import qualified Fleet.TaskSpec
-import qualified Live.FollowingSpec
-import qualified Live.HistorySpec
-import qualified Live.HubSpec
-import qualified Live.ServerSpec
 import qualified Promises.PromisesSimSpec
 import qualified Ros.CallSpec
 import qualified Ros.GoalSpec
@@ -43,12 +39,6 @@ import qualified Trace.ProgramsSpec
 
 main :: IO ()
 main = hspec $ do
-  -- (First: it waits for clocks and sockets, while other programs need the processors.)
-  describe "The live page" $ do
-    Live.HistorySpec.spec
-    Live.ServerSpec.spec
-    describe "A trace file" Live.FollowingSpec.spec
-    describe "Many robots" Live.HubSpec.spec
   describe "Promises, under all schedules" Promises.PromisesSimSpec.spec
   describe "resumable" Behavior.ResumableSimSpec.spec
   describe "withTSem" Behavior.SemaphoreSimSpec.spec
