@@ -1,8 +1,8 @@
 # Checks the format of files (with LC_ALL=C): no tab, no blank at the end of a line, at most 120 characters in a
 # line, and in a Haskell module the imports by name in each group. Prints each place, and what is allowed there.
 #
-# Longer may be: the row of a table, what an example prints, and a line with a link. Of a Markdown page only the
-# examples are checked: a paragraph is wrapped by what shows the page, and is there in lines of any length.
+# Longer may be: the row of a table, what an example or a program prints (on a page, what is between ``` and ``` and is
+# not Haskell; .ci/signatures prints a page of its own), and a line with a link or a picture.
 
 function wrong(allowed) {
   print FILENAME ":" FNR ": " allowed
@@ -19,6 +19,7 @@ FNR == 1 {
   page = FILENAME ~ /\.md$/
   module = FILENAME ~ /\.hs$/
   printed = 0
+  block = ""
   before = ""
 }
 
@@ -34,10 +35,12 @@ FNR == 1 {
     } else if (text ~ /^:\}/) printed = 1
     else if (text ~ /^(```)?$/) printed = 0
   } else printed = 0
+  if (page && text ~ /^ *```/) block = block == "" ? text : ""
 }
 
-characters($0) > 120 && (page ? example : !printed || example) && text !~ /^\|.*\|$|\t.*\t|https?:/ {
-  wrong("at most 120 characters, but in a table, in what an example prints, and with a link; here: " characters($0))
+characters($0) > 120 && (!printed || example) && (block ~ /^( *```haskell)?$/ || example) &&
+  FILENAME !~ /signatures\.md$/ && text !~ /^\|.*\|$|\t.*\t|https?:|^!\[/ {
+  wrong("at most 120 characters, but in a table, in what is printed, and with a link; here: " characters($0))
 }
 
 /\t/ && FILENAME !~ /(Makefile|\.tsv|\.go|go\.mod)$/ { wrong("no tab, but in a Makefile, in .tsv and in Go") }
