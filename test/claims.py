@@ -27,9 +27,9 @@ def percentile(numbers, share):
     return numbers[min(len(numbers) - 1, int(share * len(numbers)))]
 
 
-def run_rows(modules, chosen, beside, after=lambda row: None):
+def run_rows(modules, chosen, beside, after=lambda: None):
     """Runs the chosen rows of these modules, their functions row_NUMBER: one after the other, but beside[row], with
-    it. After a row runs what cleans up."""
+    it. After a row and those beside it runs what cleans up."""
     rows = {name: row for module in modules for name, row in vars(module).items() if name.startswith("row_")}
 
     def judged(row):
@@ -38,14 +38,13 @@ def run_rows(modules, chosen, beside, after=lambda row: None):
             rows[f"row_{row}"]()
         except Exception as problem:
             claim(row, "the row ended", f"{type(problem).__name__}: {problem}".splitlines()[0], "well", False)
-        if row not in beside:
-            after(row)
         print(f"row {row}: it took {time.monotonic() - begun:.0f} s", flush=True)
 
     for row in chosen:
         if beside.get(row) not in chosen:
             with concurrent.futures.ThreadPoolExecutor() as together:
                 list(together.map(judged, [row, *(other for other in chosen if beside.get(other) == row)]))
+            after()
 
 
 def end():

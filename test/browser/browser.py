@@ -7,7 +7,8 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
 from claims import claim
-from robot import FOLDER, until
+from robot import FOLDER
+from watching import until
 
 # What a tab notes of itself: values of the clock and when they came (both in milliseconds of POSIX), and its frames.
 NOTES = """
@@ -128,10 +129,11 @@ class Browser:
         return [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"] + [
             m["params"]["url"] for m in messages if m["method"] == "Network.webSocketCreated"]
 
-    def problems(self):
-        """What the console and the page say of errors."""
-        return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"] + self.js(
-            "notes.errors")
+    def no_problems(self, row):
+        """Neither the console nor the page says anything of errors. (Reading the console's makes it forget them.)"""
+        problems = [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"]
+        problems += self.js("notes.errors")
+        claim(row, "errors in the console", problems, "none", not problems)
 
 
 def delays(clock):

@@ -8,7 +8,8 @@ import time
 from browser import Browser
 from claims import at_most, claim
 from readers import Tunnel
-from robot import FOLDER, Robot, names_running, until
+from robot import FOLDER, Robot, names_running
+from watching import until
 
 HOSTILE = "<img src=x onerror=window.hit=1>/../\u202e\x1b[31m?#\"'"
 
@@ -160,7 +161,7 @@ def hostile(browser, hub):
     foreign = [url for url in browser.requests()
                if not url.startswith((hub.address, hub.address.replace("http", "ws"), "data:"))]
     claim(14, "requests to anything else", foreign, "none", not foreign)
-    claim(14, "errors in the console", browser.problems(), "none", not browser.problems())
+    browser.no_problems(14)
 
 
 def accessible():

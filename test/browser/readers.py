@@ -62,7 +62,11 @@ class Tunnel(contextlib.AbstractContextManager):
         with contextlib.suppress(OSError):
             while True:
                 here, _ = self.listening.accept()
-                there = socket.create_connection(("127.0.0.1", self.to))
+                try:
+                    there = socket.create_connection(("127.0.0.1", self.to))
+                except OSError: # nothing is there
+                    here.close()
+                    continue
                 self.open.add(here)
                 for ends in ((here, there), (there, here)):
                     threading.Thread(target=self.carry, args=(here, *ends), daemon=True).start()
@@ -105,8 +109,9 @@ class Silent:
     others again and again.)"""
 
     def __init__(self, port, once=b"", more=b""):
-        self.port, self.waiting, self.stalled, self.ended = port, 0, None, None
+        self.port, self.waiting, self.ended, self.missed = port, 0, None, None
         self.more, self.begun = more, time.monotonic()
+        self.stalled = self.begun
         self.socket = socket.socket()
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         self.socket.connect(("127.0.0.1", port))
@@ -120,13 +125,18 @@ class Silent:
                             + bytes(b ^ mask[i % 4] for i, b in enumerate(attach)) + once)
 
     def watched(self, known):
-        """Looks at its connection: whether it has ended. (Stalled: the robot's bytes are taken no more.)"""
+        """Looks at its connection: whether it has ended, which it has when two looks in turn do not find it: the kernel
+        may leave one out that is there. (Stalled: the robot's bytes are taken no more.)"""
         is_there, waiting = known.get(self.socket.getsockname()[1], (False, 0))
         if self.more and self.ended is None:
             with contextlib.suppress(OSError):
                 self.socket.sendall(self.more)
-        if self.ended is None and not is_there:
-            self.ended = time.monotonic()
-        elif is_there and waiting != self.waiting:
-            self.waiting, self.stalled = waiting, time.monotonic()
+        if is_there:
+            self.missed = None
+            if waiting != self.waiting:
+                self.waiting, self.stalled = waiting, time.monotonic()
+        elif self.missed is None:
+            self.missed = time.monotonic()
+        elif self.ended is None:
+            self.ended = self.missed
         return self.ended is not None

@@ -3,22 +3,11 @@
 import json
 import os
 import subprocess
-import time
+
+from watching import whole_lines
 
 FOLDER = os.environ["BROWSER"]
 ports = iter(range(8500, 9500, 10))
-
-
-def until(condition, seconds, what="it"):
-    """What the condition gives first that is true; to wait for longer than that is a fault of the test's."""
-    ends = time.monotonic() + seconds
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > ends:
-            raise TimeoutError(f"{what} did not come within {seconds} s")
-        time.sleep(0.005)
 
 
 class Robot:
@@ -61,9 +50,7 @@ class Robot:
         """Its record so far: the events, without the header."""
         if not os.path.exists(self.file):
             return []
-        with open(self.file) as file:
-            whole = [line for line in file if line.endswith("\n")]
-        return [json.loads(line) for line in whole[1:]]
+        return [json.loads(line) for line in whole_lines(self.file)[1:]]
 
     def cpu(self):
         """How many seconds it has worked."""

@@ -8,7 +8,8 @@ import time
 from browser import Browser, delays
 from claims import all_of, at_most, claim, percentile
 from readers import Tunnel, reading
-from robot import Robot, names_running, running, until
+from robot import Robot, names_running, running
+from watching import until
 
 
 def row_1():
@@ -88,7 +89,7 @@ def row_3():
         print(f"row 3: {len(late)} values; the latest came after {max(late) * 1000:.0f} ms")
         at_most(3, "median", statistics.median(late), 0.1)
         at_most(3, "99th percentile", percentile(late, 0.99), 0.25)
-        claim(3, "errors in the console", browser.problems(), "none", not browser.problems())
+        browser.no_problems(3)
 
 
 def row_4():
@@ -136,13 +137,18 @@ def row_4():
         at_most(4, "the connection is there, and dead: until the page is live by another one", took, 12)
 
 
+# (Somewhat more than the row is about: the robot counts them when each of its steps has ended.)
+RATE = 20500
+
+
 def row_5():
     """Twenty thousand events a second, for fifty seconds."""
-    with Robot("flood", 20000, recorded=False) as robot:
-        until(lambda: robot.cpu() > 2, 20, "two seconds of work")
+    with Robot("flood", RATE, recorded=False) as robot:
+        until(lambda: robot.cpu() > 2, 60, "two seconds of work")
         alone = robot.memory()
         robot.end()
-    with Robot("flood", 20000, recorded=False) as robot, Browser() as browser:
+    with Browser() as browser, Robot("flood", RATE, recorded=False) as robot:
+        started = time.monotonic()
         browser.open(robot)
         begun, heaps = time.monotonic(), []
         while time.monotonic() - begun < 50:
@@ -151,10 +157,11 @@ def row_5():
         print(f"row 5: {len(frames)} frames: the longest took {max(frames):.0f} ms, "
               f"the median {statistics.median(frames):.0f} ms; the page has held {browser.js('spans.size')} spans")
         with_page = robot.memory()
+        lasted = time.monotonic() - started
         made = int(robot.end())
         browser.comes("the run is over", 5)
         numbered, lost, missed = browser.js("[next, lost, missed]")
-        claim(5, "events a second", round(made / 50), "20,000 or more", made >= 20000 * 50)
+        claim(5, "events a second", round(made / lasted), "20,000 or more", made >= 20000 * lasted)
         claim(5, "events that came, with those of which a summary came", numbered, f"{made} or more", numbered >= made)
         claim(5, "events that the robot has discarded", lost, "0", lost == 0)
         print(f"row 5: events of which only a summary came: {missed}")
@@ -174,6 +181,7 @@ def row_12():
     """A page that is overtaken says how much it has missed. (The rest of this row is in test/mutants/Live.txt.)"""
     with Robot("flood", 40000, recorded=False) as robot, Browser() as browser:
         browser.open(robot)
+        until(lambda: browser.js("next !== null"), 5, "the snapshot")
         browser.driver.execute_script("""
           window.came = next;
           const learned = receive;
@@ -181,8 +189,7 @@ def row_12():
           const begun = performance.now();
           while (performance.now() - begun < 4500);""")
         until(lambda: browser.js("missed"), 30, "a gap")
-        came, missed, after = browser.js("[came, missed, next]")
+        came, missed, after, told = browser.js("[came, missed, next, document.getElementById('told').textContent]")
         claim(12, "events that came, and those that the page says it has missed", f"{came} and {missed}",
               f"{after} in all", came + missed == after)
-        told = browser.text("#told")
         claim(12, "the page says", told, f"gap: of {missed} events", told.startswith(f"gap: of {missed} events"))

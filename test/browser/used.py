@@ -1,6 +1,7 @@
 """Rows 10, 11 and 13: by a keyboard, by other programs, and in the documentation."""
 
 import collections
+import contextlib
 import json
 import os
 import shutil
@@ -12,7 +13,8 @@ from PIL import Image, ImageChops
 from browser import Browser
 from claims import all_of, claim
 from readers import serving
-from robot import FOLDER, Robot, until
+from robot import FOLDER, Robot
+from watching import until
 
 
 def row_10():
@@ -82,8 +84,9 @@ def by_keyboard(browser, robot):
 def row_11():
     """Other programs read what is made of a trace."""
     with Robot("work") as robot:
-        robot.tell("order dock")
-        until(lambda: any(e.get("name") == "dock" for e in robot.recorded()), 5, "dock")
+        for order in ("survey", "dock"): # (the first is its own, and the second a reaction)
+            robot.tell("order " + order)
+            until(lambda: any(e.get("name") == order for e in robot.recorded()), 5, order)
         robot.end()
     for file in (robot.file, "test/golden/mission.jsonl", "test/golden/detailed.jsonl"):
         made = f"{FOLDER}/otlp.json"
@@ -142,9 +145,8 @@ def row_13():
     file, made, picture = FOLDER + "/door-battery.jsonl", FOLDER + "/live-page.png", "docs/pictures/live-page.png"
     mission = [FOLDER + "/door-battery", "--program", "names", "--simulate", "--trace", file]
     subprocess.run(mission, check=True, stdout=subprocess.DEVNULL)
-    tool = subprocess.Popen([FOLDER + "/behavior-trace", file, "--live"], stderr=subprocess.PIPE, text=True)
-    with Browser(width=1000, height=800) as browser:
-        browser.driver.get("http" + tool.stderr.readline().split("http")[1].strip())
+    with shown_live(file) as address, Browser(width=1000, height=800) as browser:
+        browser.driver.get(address)
         browser.comes("live", 5)
         until(lambda: browser.js("reactions.length") == 2, 5, "the reactions")
         browser.driver.execute_script("""
@@ -156,8 +158,6 @@ def row_13():
               browser.tree() == ["mission", "enter room", "pass through back door"])
         browser.driver.save_screenshot(made)
         words = browser.js("document.body.innerText") + "\n"
-    tool.kill()
-    tool.communicate()
     with open(FOLDER + "/live-page.txt", "w") as file:
         file.write(words)
     with open("test/golden/live-page.txt") as file:
@@ -175,6 +175,17 @@ def row_13():
     pictures()
 
 
+@contextlib.contextmanager
+def shown_live(file):
+    """The address of the live page of a trace file."""
+    tool = subprocess.Popen([FOLDER + "/behavior-trace", file, "--live"], stderr=subprocess.PIPE, text=True)
+    try:
+        yield "http" + tool.stderr.readline().split("http")[1].strip()
+    finally:
+        tool.kill()
+        tool.communicate()
+
+
 def pictures():
     """Pictures of three missions, in two sizes, light and dark: for someone who has not seen the page to look at."""
     missions = {"door-battery": ["door-battery", "--program", "names"], "patrol": ["robots", "patrol"],
@@ -185,19 +196,17 @@ def pictures():
         file = f"{FOLDER}/{name}.jsonl"
         subprocess.run([f"{FOLDER}/{program}", *arguments, "--simulate", "--trace", file], check=True,
                        stdout=subprocess.DEVNULL)
-        tool = subprocess.Popen([FOLDER + "/behavior-trace", file, "--live"], stderr=subprocess.PIPE, text=True)
-        address = "http" + tool.stderr.readline().split("http")[1].strip()
-        for width, dark in ((1280, False), (1280, True), (360, False), (360, True)):
-            with Browser(width=width, dark=dark) as browser:
-                browser.driver.get(address)
-                browser.comes("live", 5)
-                until(lambda: browser.texts("#interruptions li"), 5, "an interruption")
-                browser.driver.execute_script("""
-                  document.getElementById("time").value = 620;
-                  document.getElementById("time").dispatchEvent(new Event("input"));""")
-                until(lambda: browser.js("frame === null"), 5, "the frame")
-                browser.driver.save_screenshot(f"{FOLDER}/pictures/{name}-{width}-{'dark' if dark else 'light'}.png")
-        tool.kill()
-        tool.communicate()
+        with shown_live(file) as address:
+            for width, dark in ((1280, False), (1280, True), (360, False), (360, True)):
+                with Browser(width=width, dark=dark) as browser:
+                    browser.driver.get(address)
+                    browser.comes("live", 5)
+                    until(lambda: browser.texts("#interruptions li"), 5, "an interruption")
+                    browser.driver.execute_script("""
+                      document.getElementById("time").value = 620;
+                      document.getElementById("time").dispatchEvent(new Event("input"));""")
+                    until(lambda: browser.js("frame === null"), 5, "the frame")
+                    scheme = "dark" if dark else "light"
+                    browser.driver.save_screenshot(f"{FOLDER}/pictures/{name}-{width}-{scheme}.png")
     kept = os.listdir(FOLDER + "/pictures")
     claim(13, "pictures of three missions, in dist-newstyle/browser/pictures", len(kept), "12", len(kept) == 12)

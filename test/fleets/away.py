@@ -8,8 +8,9 @@ import subprocess
 import time
 
 from claims import claim
-from fleet import FOLDER, Robot, address, as_server, fresh, kill_all, number, psql, server, until
-from processes import end, family, postmaster
+from fleet import FOLDER, Robot, address, as_server, fresh, kill_all, number, psql, server
+from watching import until
+from processes import end, family, postmaster, sent
 
 OUTAGE, GOES_ON, TERM = 30, 5, 3
 OTHER = f"{FOLDER}/sockets"
@@ -62,12 +63,14 @@ def slow():
     late = f"SYSTEM:sleep 3; exec socat - UNIX-CONNECT\\:{FOLDER}/.s.PGSQL.5432"
     with subprocess.Popen(["socat", f"UNIX-LISTEN:{folder}/.s.PGSQL.5432,fork", late],
                           stderr=subprocess.DEVNULL) as socat:
-        until(lambda: os.path.exists(f"{folder}/.s.PGSQL.5432"), 10, "the slow server")
-        begun = time.monotonic()
-        with Robot("submit", "office", 1, 1, 0, database=address(host=folder)) as office:
-            until(lambda: office.says("submitted") or time.monotonic() > begun + 30, 40)
-            took = float((office.says("submitted") or [["inf"]])[0][0]) - begun
-        socat.terminate()
+        try:
+            until(lambda: os.path.exists(f"{folder}/.s.PGSQL.5432"), 10, "the slow server")
+            begun = time.monotonic()
+            with Robot("submit", "office", 1, 1, 0, database=address(host=folder)) as office:
+                until(lambda: office.says("submitted") or time.monotonic() > begun + 30, 40)
+                took = float((office.says("submitted") or [["inf"]])[0][0]) - begun
+        finally:
+            socat.terminate()
     claim(3, "slow: who connects to a server that takes 3 s to answer is connected after", f"{took:.1f} s",
           "within 10 s", took <= 10)
 
@@ -116,7 +119,7 @@ def standing_by(primary, standby, host, other, how):
     until(lambda: len(office.says("done")) >= 40, 30, "orders that are done")
     processes = family(postmaster(primary))
     for process in processes:
-        os.kill(process, signal.SIGSTOP)
+        sent(signal.SIGSTOP, process)
     if how == "killed":
         end(processes)
     time.sleep(1)

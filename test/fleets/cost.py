@@ -9,7 +9,8 @@ import uuid
 import psycopg2
 
 from claims import claim
-from fleet import BUILT, FOLDER, Robot, address, fresh, kill_all, number, psql, until
+from fleet import BUILT, FOLDER, Robot, address, fresh, kill_all, number, psql
+from watching import until
 from processes import cpu, family, postmaster
 
 

@@ -5,14 +5,16 @@ import random
 import signal
 import subprocess
 import sys
-import threading
 import time
 import uuid
 from concurrent.futures import ThreadPoolExecutor
+from itertools import repeat
 
 import psycopg2
 from claims import claim
-from fleet import CLOCK, FOLDER, SEED, TRUE_CLOCK, Robot, address, fresh, kill_all, number, psql, server, until
+from fleet import CLOCK, FOLDER, SEED, TRUE_CLOCK, Robot, address, fresh, kill_all, number, psql, server
+from processes import sent
+from watching import until
 
 TERM = 1
 
@@ -104,8 +106,10 @@ def asked_at_once():
     with ThreadPoolExecutor() as beside:
         answer = beside.submit(ask, second, hold("carl"))
         waits = f"select wait_event_type = 'Lock' from pg_stat_activity where pid = {second.info.backend_pid}"
-        until(lambda: ask(watching, waits), 10, "the second's wait", step=0)
-        first.commit()
+        try:
+            until(lambda: ask(watching, waits), 10, "the second's wait", step=0)
+        finally:
+            first.commit()
         answers.append(answer.result())
     has = [fences is not None for fences in answers]
     claim(2, "two that ask for a free door at once: whether they have it", has, [True, False], has == [True, False])
@@ -211,16 +215,14 @@ class Phase:
         self.is_over = False
         begins = {door: len(door.record()) for door in doors}
         self.blows = {door: [] for door in doors}
-        threads = [threading.Thread(target=self.strike, args=(n, door, robots[door], blows))
-                   for n, door in enumerate(doors)]
-        stepping = threading.Thread(target=self.step, args=(step,))
-        for thread in (*threads, stepping):
-            thread.start()
-        for thread in threads:
-            thread.join()
-        time.sleep(1.7 * TERM)
-        self.is_over = True
-        stepping.join()
+        with ThreadPoolExecutor(len(doors) + 1) as together:
+            stepping = together.submit(self.step, step)
+            try:
+                list(together.map(self.strike, range(len(doors)), doors, map(robots.get, doors), repeat(blows)))
+                time.sleep(1.7 * TERM)
+            finally:
+                self.is_over = True
+        stepping.result()
         self.lines = {door: door.record()[begins[door]:] for door in doors}
 
     def step(self, step):
@@ -262,7 +264,7 @@ class Phase:
         else:
             backends = psql(f"select pid from pg_stat_activity where application_name = '{robot.name}'").split()
             for backend in map(int, backends):
-                os.kill(backend, signal.SIGSTOP)
+                sent(signal.SIGSTOP, backend)
         time.sleep(0.005)  # (What was on its way to the door is there.)
         is_hit = door.inside() == (robot.name, since)
         self.blows[door].append((kind, at, robot.name, is_hit))
@@ -272,7 +274,7 @@ class Phase:
             time.sleep(1.3 * TERM if is_hit else 0)
             robot.thaw()
         for backend in map(int, backends):
-            os.kill(backend, signal.SIGCONT)
+            sent(signal.SIGCONT, backend)
         return is_hit
 
 

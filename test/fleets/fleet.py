@@ -6,7 +6,8 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
+
+from watching import whole_lines
 
 FOLDER, BUILT, BIN = os.environ["FLEET"], os.environ["BUILT"], os.environ["bin"]
 SEED = int(os.environ.get("SEED") or random.randrange(10**6))
@@ -29,18 +30,6 @@ $$
 TRUE_CLOCK = """
 create or replace function fleet.clock() returns timestamptz language sql volatile as 'select clock_timestamp()'
 """
-
-
-def until(condition, seconds, what="it", step=0.01):
-    """What the condition gives first that is true; to wait for longer than that is a fault of the test's."""
-    ends = time.monotonic() + seconds
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > ends:
-            raise TimeoutError(f"{what} did not come within {seconds} s")
-        time.sleep(step)
 
 
 def psql(text, user="owner", database="fleet", host=FOLDER):
@@ -135,8 +124,7 @@ class Robot:
 
     def lines(self):
         """What it has said, in words: the first is when, by the clock of time.monotonic."""
-        with open(self.said, encoding="utf-8", errors="replace") as said:
-            return [line.split() for line in said if line.endswith("\n")]
+        return [line.split() for line in whole_lines(self.said)]
 
     def last(self):
         """The last line that it has said."""

@@ -23,5 +23,5 @@ BESIDE = {7: 3, 10: 3, 6: 8}
 
 print(f"SEED={SEED}", flush=True)
 # (What a row that did not end has left is killed.)
-run_rows(MODULES, list(map(int, sys.argv[1:])), BESIDE, after=lambda row: kill_all(running))
+run_rows(MODULES, list(map(int, sys.argv[1:])), BESIDE, after=lambda: kill_all(running))
 end()

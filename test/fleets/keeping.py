@@ -13,7 +13,7 @@ import time
 import claims
 import fleet
 from fleet import BUILT, FOLDER, another_server, server
-from processes import family, postmaster
+from processes import family, postmaster, sent
 
 folder = f"{FOLDER}/kept"
 TOOL, ROBOTS = f"{BUILT}/behavior-fleet", f"{BUILT}/fleets"
@@ -217,9 +217,7 @@ def killed(claim, reference):
             struck["tool"] += process.poll() is None
             process.kill()
         else:
-            for backend in backends():
-                os.kill(backend, signal.SIGKILL)
-                struck["server"] += 1
+            struck["server"] += sum(sent(signal.SIGKILL, backend) for backend in backends())
         process.wait()
         wait_for_server()
         found = whole()

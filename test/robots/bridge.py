@@ -49,7 +49,10 @@ class Client:
         self.subscribed, self.said, self.goals = set(), queue.Queue(), queue.Queue()
         head = b""
         while b"\r\n\r\n" not in head:
-            head += self.socket.recv(4096)
+            part = self.socket.recv(4096)
+            if not part:
+                raise ConnectionError("a client that left before it had asked for the websocket")
+            head += part
         key = next(line for line in head.split(b"\r\n") if line.lower().startswith(b"sec-websocket-key:"))
         accept = hashlib.sha1(key.split(b":")[1].strip() + b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11").digest()
         self.socket.sendall(b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"

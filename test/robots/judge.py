@@ -14,26 +14,27 @@ import statistics
 import sys
 
 from claims import all_of, at_most, claim, end, percentile
+from watching import whole_lines
 
 FOLDER, ROWS = sys.argv[1], [int(row) for row in sys.argv[2:]]
 
 # What the servers have recorded of each goal, and each topic: (time, event), in the order of time.
 record = collections.defaultdict(list)
-for line in sorted(open(FOLDER + "/record"), key=lambda line: float(line.split()[0])):
+for line in sorted(whole_lines(FOLDER + "/record"), key=lambda line: float(line.split()[0])):
     when, name, order, event = line.split()
     record[int(order) or name].append((float(when), event))
 
 # What the program believes, by row.
 believed = collections.defaultdict(list)
 for name in glob.glob(FOLDER + "/believed-*"):
-    for line in open(name):
+    for line in whole_lines(name):
         entry = json.loads(line)
         believed[entry["row"]].append(entry)
 
 # What each bridge that is none has recorded, by what it was started for.
 lies_of = collections.defaultdict(list)
 if os.path.exists(FOLDER + "/lies"):
-    for line in open(FOLDER + "/lies"):
+    for line in whole_lines(FOLDER + "/lies"):
         entry = json.loads(line)
         lies_of[entry["mode"]].append(entry)
 
@@ -130,7 +131,7 @@ def is_right(parts):
 
 
 def row_1():
-    events = [line.split() for line in open(FOLDER + "/missions")]
+    events = [line.split() for line in whole_lines(FOLDER + "/missions")]
     starts = [i for i, (_, what, _, _) in enumerate(events) if what == "mission"] + [len(events)]
     believes = [e["how"] for e in believed[1] if "mission" in e]
     right = interrupted = running = rejected = both = unheeded = total = 0
