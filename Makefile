@@ -1,5 +1,5 @@
 .PHONY: help demo test programs skeleton warnings doctest readme lint docs check matrix bench bench-check soak rules \
-  signals reality attacks robot robots fleet fleets browser mutants release ci clean
+  signals reality attacks robot robots fleet fleets browser mutants mutants-fit release ci clean
 
 help:
 	@echo 'make demo      a robot recharges, finds the front door locked and takes the back door'
@@ -11,6 +11,7 @@ help:
 	@echo 'make doctest   run the examples in the documentation'
 	@echo 'make readme    run the program in README.md'
 	@echo 'make lint      hlint, format, phrases, links, and whether mutants and pages fit the sources'
+	@echo 'make mutants-fit  whether the mutants fit the tests; one of each test program is tried'
 	@echo 'make docs      build the documentation, which must cover every export'
 	@echo 'make check     check the package with cabal check'
 	@echo 'make matrix    demo and test in clean Debian systems (SUITES="bookworm" selects one)'
@@ -89,6 +90,9 @@ browser:
 
 mutants:
 	@.ci/mutants $(NAMES)
+
+mutants-fit:
+	@.ci/mutants --fit
 
 ci:
 	@.ci/run
