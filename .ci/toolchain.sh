@@ -263,3 +263,31 @@ sources() {
     [ ! -e "$file" ] || printf '%s\0' "$file"
   done | tar --null -T - -c
 }
+
+# --- mutants of what is judged ----------------------------------------------
+
+# try_mutants NAME ROWS INSTALLED...: applies each small mistake of test/NAME/mutants.tsv (only those of the rows, if
+# there are some) to a copy of this checkout, in which .ci/NAME must detect it by its row. What is installed is linked.
+try_mutants() {
+  local name=$1 rows=$2 built=$PWD/dist-newstyle/$1 row file change what verdict status=0
+  mutated=$(mktemp -d)
+  trap 'rm -rf "$mutated"' EXIT
+  sources | tar -x -C "$mutated"
+  mkdir -p "$built" "$mutated/dist-newstyle/$name"
+  for file in "${@:3}"; do ln -s "$built/$file" "$mutated/dist-newstyle/$name/"; done
+  while IFS=$'\t' read -r row file change what; do
+    [ -z "$rows" ] || [[ " $rows " == *" $row "* ]] || continue
+    cp "$file" "$mutated/$file"
+    sed -i "$change" "$mutated/$file"
+    ! cmp -s "$file" "$mutated/$file" || die "test/$name/mutants.tsv: $what: it changes nothing in $file"
+    verdict=detected
+    if (cd "$mutated" && ".ci/$name" "$row" </dev/null) >"$built/mutant" 2>&1; then
+      verdict=SURVIVED status=1
+    elif ! grep -q ': FAILED$' "$built/mutant"; then
+      verdict='NOT TRIED (it does not compile, or nothing was judged)' status=1
+    fi
+    echo "row $row: $what: $verdict"
+    cp "$file" "$mutated/$file"
+  done < <(grep -v '^#' "test/$name/mutants.tsv")
+  return $status
+}

@@ -9,8 +9,8 @@ import time
 
 from claims import claim
 from fleet import FOLDER, Robot, address, as_server, fresh, kill_all, number, psql, server
-from watching import until
 from processes import end, family, postmaster, sent
+from watching import until
 
 OUTAGE, GOES_ON, TERM = 30, 5, 3
 OTHER = f"{FOLDER}/sockets"
